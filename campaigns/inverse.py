@@ -220,9 +220,9 @@ def run(options: argparse.Namespace) -> Findings:
         missed, more, wrong = _compare(family(options.linkages, rng), options.linkages, rng)
         scans.rows.append((kind, f'{options.linkages:,}', str(missed), str(more), str(wrong)))
         faults += missed + wrong
-    found = [f'an error of {greatest:.2f}'] if greatest > 8.0 else []
-    found += [f'{faults} linkages with missed or wrong cranks'] if faults else []
-    return Findings([table, scans], found, [('values', f'{values:,}')])
+    lines = [f'an error of {greatest:.2f}'] if greatest > 8.0 else []
+    lines += [f'{faults} linkages with missed or wrong cranks'] if faults else []
+    return Findings([table, scans], lines, [('values', f'{values:,}')])
 
 
 def _compare(closures: Iterable[Closure], count: int, rng: random.Random) -> tuple[int, int, int]:

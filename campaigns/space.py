@@ -27,20 +27,16 @@ from bench.report import Table
 from campaigns import space_reference as exact
 from campaigns.accuracy.run import accuracy_table, LIMIT, worst_table
 from campaigns.campaign import Findings, Page, Part, parts_of, tallies_of
+from campaigns.series import Row, Series, Tape
 from campaigns.tally import Judgement, QUANTITIES
 from linkage_ros.description import load
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint, Status
 from linkage_ros.kinematics.space.joints import HingePair, SlidePair
-from linkage_ros.kinematics.space.steps import (
-    ClosedHinge,
-    ClosedSlide,
-    GROUND_FRAME,
-    LinkState,
-    Rod,
-    STILL,
-)
+from linkage_ros.kinematics.space.steps import ClosedHinge, ClosedSlide, Rod
 from linkage_ros.kinematics.space.three_distances import order_ends, ThreeDistances
+from linkage_ros.kinematics.space.vectors import GROUND_FRAME, STILL
+from linkage_ros.kinematics.step import LinkState
 
 PAGE = Page(
     ROOT / 'docs' / 'accuracy' / 'space.md',
@@ -119,7 +115,7 @@ def _joint_case(
     step: Any, motion: Sequence[Any], solve: Callable[..., Any], floor: float | None = None
 ) -> Case:
     found = [one.coordinates[1] for one in _states_after(step, *([part] for part in motion))]
-    tape = exact.Tape()
+    tape = Tape()
     value = solve(tape.row(step.place), tape.row(*motion), tape.number(step.rod[0]), step.sign)
     return Case(exact.errors_of(value, found, floor), (step, motion))
 
@@ -138,7 +134,7 @@ def three_distances_case(random: Random, near: bool = False) -> Case:
     side = sign if order in ([0, 1, 2], [1, 2, 0], [2, 0, 1]) else -sign
     lengths = tuple(Rod(rods[end]) for end in order)
     step = ThreeDistances(tuple(end + 1 for end in order), lengths, float(side), 4)
-    axis, tape = random.randrange(3), exact.Tape()
+    axis, tape = random.randrange(3), Tape()
     given = [tape.row(*each) for each in zip(*motion, strict=True)]
     point = exact.three_spheres(given, tape.row(rods), sign)
     found = [state.pins[4][axis] for state in _states_after(step, *motion)]
@@ -162,19 +158,19 @@ def rssr_case(random: Random) -> Case:
             continue  # It is drawn at a toggle.
         if closure.position(state[0]).status.has_rates:
             break
-    tape = exact.Tape()
+    tape = Tape()
     axis = _axis_on(tape, linkage, 'crank')
     pin = exact.turned_about(tape.row(linkage.points['A']), *axis, tape.number(*state))
     (found,) = joint_orders(closure, *([number] for number in state))
     return Case(_held_errors(tape, closure, ('rocker', 'B', 'A'), pin, found), (linkage, state))
 
 
-def _axis_on(tape: exact.Tape, linkage: SpaceLinkage, hinge: str) -> tuple[exact.Row, exact.Row]:
+def _axis_on(tape: Tape, linkage: SpaceLinkage, hinge: str) -> tuple[Row, Row]:
     return tape.row(linkage.hinges[hinge].at), tape.row(linkage.hinges[hinge].axis)
 
 
 def _held_errors(
-    tape: exact.Tape, closure: Any, names: Sequence[str], pin: exact.Row, found: Sequence[float]
+    tape: Tape, closure: Any, names: Sequence[str], pin: Row, found: Sequence[float]
 ) -> list[float]:
     """Return the errors of a hinge, one of whose points a rod holds at a distance from a pin."""
     hinge, point, other = names
@@ -207,9 +203,7 @@ def _ankle_in_a_state(random: Random, name: str, reach: float) -> tuple[Any, lis
             return closure, states
 
 
-def _feet(
-    tape: exact.Tape, linkage: SpaceLinkage, pitch: exact.Series, roll: exact.Series
-) -> list[exact.Row]:
+def _feet(tape: Tape, linkage: SpaceLinkage, pitch: Series, roll: Series) -> list[Row]:
     """Return where the rods hold the foot."""
     first, second = (_axis_on(tape, linkage, name) for name in ('pitch', 'roll'))
     points = [tape.row(linkage.points[point]) for *_, point in _ANKLE]
@@ -220,7 +214,7 @@ def _feet(
 def ankle_case(random: Random) -> Case:
     """Return the shipped ankle in a random state; each motor is a closed form of both joints."""
     closure, states = _ankle_in_a_state(random, 'ankle', 0.5)
-    tape = exact.Tape()
+    tape = Tape()
     joints = (tape.number(*motion) for motion in zip(*states, strict=True))
     pins = _feet(tape, closure.linkage, *joints)
     motors = zip(_ANKLE, pins, joint_orders(closure, *states), strict=True)
@@ -232,7 +226,7 @@ def ankle_motors_case(random: Random) -> Case:
     closure, states = _ankle_in_a_state(random, 'ankle_motors', 0.6)
     linkage, found = closure.linkage, joint_orders(closure, *states)
 
-    def gaps(joints: exact.Row) -> Iterator[exact.Series]:
+    def gaps(joints: Row) -> Iterator[Series]:
         tape = joints[0].tape
         for (motor, bar, foot), pin, motion in zip(
             _ANKLE, _feet(tape, linkage, *joints), zip(*states, strict=True), strict=True

@@ -360,7 +360,8 @@ def run(options: argparse.Namespace) -> Findings:
     cases = f'{sum(part.size for part in work):,}'
     facts = ('cases', cases), ('python-flint', metadata.version('python-flint'))
     families = [(name, family.description) for name, family in FAMILIES.items()]
-    tables = [_errors(tallies), Table('Families', ('family', 'description'), families), _speed()]
+    named = Table('Families', ('family', 'description'), [*families])
+    tables = [_errors(tallies), named, _speed()]
     faults = [
         f'{family}: {name} {errors.greatest():.3g} of linkage {linkage_of(errors)}'
         for family, tally in tallies.items()

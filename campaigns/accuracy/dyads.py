@@ -35,6 +35,7 @@ class _Dyad:
 
     __slots__ = ()
 
+    side: int  # Of dyads with two assemblies: +1 or -1
     CLOSING: ClassVar[tuple[str, Side, Side] | None] = None  # The field, and its two sides
     TURNED: ClassVar[tuple[str, ...]] = ()  # Links whose angles it computes
     SLID: ClassVar[tuple[str, ...]] = ()  # Sliders that place a block
@@ -261,6 +262,7 @@ class RPP(_Dyad):
     def close(self, motion: Motion) -> None:
         inner, outer = (motion.mechanism.sliders[name] for name in (self.inner, self.outer))
         base, line, unit = motion.line(self.outer, outer.point)
+        assert unit is not None
         slot = unit * motion.directions[self.inner]
         start = motion.at(self.a)
         rest = start - base - unit * _pin_at_zero(motion, self.inner, outer.point, self.a.point)
@@ -275,6 +277,7 @@ class RPP(_Dyad):
         """Return the sine of the angle between the lines."""
         outer = motion.mechanism.sliders[self.outer]
         _, line, unit = motion.line(self.outer, outer.point)
+        assert unit is not None
         return _positive((unit * motion.directions[self.inner] * line.conjugate()).imag())
 
 

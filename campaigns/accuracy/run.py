@@ -274,13 +274,12 @@ def _show_case(reference: Reference, phi: float, alpha: float) -> None:
         reference.mechanism.dyads, margins(reference, phi), strict=False
     ):
         print(f'{type(dyad).__name__}: margin to the next toggle {margin:.3g} (± {tolerance:.1g})')
-    kappa = UNIT_ROUNDOFF * condition_numbers(truth) if truth.joints else ()
+    if not truth.joints:
+        return
+    kappa = UNIT_ROUNDOFF * condition_numbers(truth)
     for j, (name, joint) in enumerate(reference.mechanism.joints.items()):
         size = 2.0**truth.motion.exponent if isinstance(joint, str) else 1.0
-        for k, quantity in enumerate(QUANTITIES if truth.joints else ()):
+        for k, (quantity, found) in enumerate(zip(QUANTITIES, answer, strict=False)):
             exact = float(truth.joints[j][k]) * FACTORIALS[k] * size
-            ours = answer[k][j] if k < len(answer) and answer[k] else None
-            print(
-                f'{name} {quantity}: truth {exact!r}, package {ours!r}, '
-                f'u·κ {kappa[j, k] * size:.3g}'
-            )
+            ours = found[j] if found else None
+            print(f'{name} {quantity}: {exact!r}, package {ours!r}, u·κ {kappa[j, k] * size:.3g}')

@@ -85,8 +85,8 @@ def run(plan: Plan) -> Run:
 
 
 def _run(plan: Plan, folder: Path) -> Run:
-    rate = r'^rate: [\d.]+', f'rate: {plan.rate:g}'
-    scene = load_scene(changed_scene(folder, plan.scene, *rate))
+    file = changed_scene(folder, plan.scene, r'^rate: [\d.]+', f'rate: {plan.rate:g}')
+    scene = load_scene(file)
     pending: list[tuple[bytes, dict[str, Any]]] = []
     take = partial(_take, pending)
     pipeline = Pipeline(scene)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 import json
 from math import inf, nan
 from pathlib import Path
@@ -185,8 +186,8 @@ class Attacker:
     def __init__(self, seconds: float, seed: int, scene: Path) -> None:
         rclpy.init()
         self._scene = scene
-        self._spin = lambda wait: rclpy.spin_once(self.node, timeout_sec=wait)
         self.node = Node('attacker')
+        self._spin = partial(rclpy.spin_once, self.node)
         self.findings: list[str] = []
         self.tried: Counter[str] = Counter()
         self._seconds = seconds
@@ -234,7 +235,7 @@ class Attacker:
             if time.monotonic() > end:
                 self.findings.append(finding)
                 return
-            self._spin(0.01)
+            self._spin(timeout_sec=0.01)
 
     def _check_ticks(self) -> None:
         """Send valid samples slowly until new joint states arrive."""
@@ -242,13 +243,18 @@ class Attacker:
         self._spin_empty()
         heard = self._heard
         self._wait(
-            lambda: self._send(crank(GOOD)) or time.sleep(0.02) or self._heard > heard + 5,
+            lambda: self._sent_slowly() and self._heard > heard + 5,
             'the node does not tick',
         )
 
+    def _sent_slowly(self) -> bool:
+        self._send(crank(GOOD))
+        time.sleep(0.02)
+        return True
+
     def _spin_empty(self) -> None:
         for _ in range(200):
-            self._spin(0.0)
+            self._spin(timeout_sec=0.0)
 
     def _flood(self, seconds: float, make: Callable[[], bytes]) -> None:
         end = time.monotonic() + seconds
@@ -256,7 +262,7 @@ class Attacker:
             message = make()
             for _ in range(100 if len(message) < 1000 else 1):
                 self._send(message)
-            self._spin(0.0)
+            self._spin(timeout_sec=0.0)
 
     def _valid_or_not(self) -> bytes:
         if self._random.random() < 0.3:
@@ -276,7 +282,7 @@ class Attacker:
             else:  # some get no response: rclpy raises for parameters without a type
                 waiting.pop(0)
             self._send(crank(GOOD))
-            self._spin(0.001)
+            self._spin(timeout_sec=0.001)
             waiting = [future for future in waiting if not future.done()]
 
     def _reactivate(self) -> None:

@@ -26,7 +26,14 @@ import tempfile
 from bench.report import Table
 from campaigns.campaign import Findings, Page, Part, parts_of, tallies_of
 from campaigns.reliability.judge import FAULT, read
-from campaigns.reliability.recording import JOINT_STATE, KILLED, OURS, START, WRITERS
+from campaigns.reliability.recording import (
+    JOINT_STATE,
+    KILLED,
+    NumberedMessage,
+    OURS,
+    START,
+    WRITERS,
+)
 from campaigns.tally import Judgement, Tally
 from linkage_ros.bag import (
     BagMessage,
@@ -67,7 +74,7 @@ class Subject:
 def make(kind: str, folder: Path, seed: int, size: int) -> Subject:
     """Make a bag by a writer, whose file has about ``size`` bytes."""
     random = Random(f'{seed} {kind}')
-    messages = []
+    messages: list[NumberedMessage] = []
     for index in range(max(size // 240, 20)):
         stamp = START + index * 1_000_000
         data = b'\x00\x01\x00\x00' + random.randbytes(random.randrange(60, 300))
@@ -75,7 +82,7 @@ def make(kind: str, folder: Path, seed: int, size: int) -> Subject:
     file = WRITERS[kind](folder, _TOPICS, _ATTACHMENTS, messages)
     named = folder if (folder / 'metadata.yaml').exists() else file
     bag = read_bag(named, allow_truncated=kind == KILLED)
-    expected = [BagMessage(_TOPICS[topic].name, *rest) for topic, *rest in messages]
+    expected = [BagMessage(_TOPICS[each[0]].name, *each[1:]) for each in messages]
     assert list(bag.messages()) == expected, 'the undamaged bag differs from what was written'
     return Subject(folder, file, file.read_bytes(), expected, bag.topics, bag.attachments)
 

@@ -62,7 +62,7 @@ _WORDS = (
     *(b'', b'~', b'[[[[', b'{a: {b: {}}}', b'*a', b'&a [*a]', b'1e999', b'.nan', b'-1', b'\0'),
     *(b'9' * 5000, b'x' * 50_000, b'\xff\xfe', b'\x1b[31m', '\u202e'.encode(), b'os.path: {}'),
 )
-_AT_CHECKSUM = {Opcode.CHUNK: 33, Opcode.DATA_END: 9, Opcode.FOOTER: 25}
+_AT_CHECKSUM: dict[int, int] = {Opcode.CHUNK: 33, Opcode.DATA_END: 9, Opcode.FOOTER: 25}
 """Offset of the checksum in each record; an attachment has it at its end."""
 
 
@@ -226,7 +226,7 @@ def _extreme(content: bytes, random: Random) -> bytes:
     begin, end = _some(content, random)
     size = random.choice((2, 4, 8))
     place = random.randrange(begin, max(begin + 1, min(end, begin + 120)))
-    number = random.choice(_EXTREMES) % 2 ** (8 * size)
+    number = int(random.choice(_EXTREMES) % 2 ** (8 * size))
     after = place + size
     return content[:place] + number.to_bytes(size, 'little') + content[after:]
 

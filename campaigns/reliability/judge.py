@@ -109,7 +109,7 @@ class Metadata(NamedTuple):
     """The content of ``metadata.yaml``: the named files, the number of messages, and its fault."""
 
     files: Sequence[str] = ()
-    count: int = 0
+    messages: int = 0
     fault: str = ''
 
 

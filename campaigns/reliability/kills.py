@@ -34,7 +34,7 @@ import socket
 import sys
 from tempfile import TemporaryDirectory
 from time import monotonic, monotonic_ns, sleep
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from bench.report import Table
 from campaigns.campaign import Findings, Page, percentile_texts, progress_lines, results_of
@@ -132,6 +132,10 @@ class Marks(ctypes.Structure):
     offered: int
     safe: int
     ticks: int  # Number of ticks begun
+    state: int
+    pauses: int
+    ends_of_pauses: Any
+    times: memoryview
     _fields_: ClassVar = [
         ('state', ctypes.c_int64),
         ('offered', ctypes.c_int64),
@@ -305,8 +309,8 @@ def _metadata(outcome: Outcome, folder: Path) -> str:
     listed = read_metadata(folder)
     if listed.fault:
         return FAULT + listed.fault
-    if listed.count > outcome.found:
-        return f'{FAULT}counts {listed.count} messages, {outcome.found} exist'
+    if listed.messages > outcome.found:
+        return f'{FAULT}counts {listed.messages} messages, {outcome.found} exist'
     newest = max(map(_number, listed.files))
     outcome.leftovers += [
         NEXT_FILE if _number(name) > newest else OLD_FILE

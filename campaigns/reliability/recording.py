@@ -273,7 +273,7 @@ def _by_mcap(**options: Any) -> Callable[..., Path]:
             channels = [writer.register_channel(t.name, 'cdr', schema) for t in topics]
             for topic, log_time, publish_time, data in messages:
                 writer.add_message(channels[topic], log_time, data, publish_time)
-            writer.finish()
+            writer.finish()  # type: ignore[no-untyped-call]
         return file
 
     return write

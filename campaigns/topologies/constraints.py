@@ -133,7 +133,8 @@ class Equations:
 
         """
         count = unknowns.shape[1]
-        rows, sizes = [], []
+        rows: list[Array] = []
+        sizes: list[Any] = []
         jacobian = np.zeros((count, self.count, self.count), Real)
         turned = self._turned(unknowns)
         for kind, parts in self._each():
@@ -398,7 +399,7 @@ def condition_numbers(
     start = np.tile(motion.unknowns, (1, _SAMPLES))
     _, _, sizes = varied.residuals(start, wide[0])
     moved, _ = varied.correct(start, wide[0], noise * sizes, 3)
-    changed = varied.motion(moved, *wide, noise=noise).joints
+    changed = varied.motion(moved, wide[0], wide[1], wide[2], noise).joints
     found = []
     for base, other in zip(motion.joints, changed, strict=True):
         change = np.abs(other.reshape(len(base), _SAMPLES, count) - base[:, None, :]).max(1)
@@ -442,7 +443,7 @@ def solve(jacobian: Array, right: Array) -> Array:
         for _ in range(_REFINEMENTS):
             error = rest - scaled @ found
             found = found + (inverse @ error.astype(float))
-    return found[:, :, 0].T
+    return np.asarray(found[:, :, 0].T)
 
 
 def _inverse(matrix: Array) -> Array:

@@ -137,7 +137,7 @@ class Geometry:
 
     def at(self, places: Places, spot: Spot) -> Array:
         """Return the position of a point."""
-        return places.origins[spot.link] + places.units[spot.link] * self.point(*spot)
+        return np.asarray(places.origins[spot.link] + places.units[spot.link] * self.point(*spot))
 
     def _side(self, closing: str, places: Places) -> Any:
         side = self._sides[closing]
@@ -307,7 +307,7 @@ UNIT = 2.0**-53
 
 def _crossing(between: Array, one: Array, other: Array) -> Array:
     """Return the distance along the first line to its intersection with the second."""
-    return (between.conj() * other).imag / (one.conj() * other).imag
+    return np.asarray((between.conj() * other).imag / (one.conj() * other).imag)
 
 
 def _polar(angle: Array) -> Array:

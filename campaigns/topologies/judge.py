@@ -183,10 +183,15 @@ def _compare_arrays(
     """Compare the solution of arrays with that of single states."""
     from linkage_ros.kinematics import CODES  # local import: with numpy only
 
-    motion = {'rates': rates.astype(float), 'accelerations': accelerations.astype(float)}
+    given = rates.astype(float), accelerations.astype(float)
     try:
         for derivatives in (0, 1, 2):
-            batch = closure.solve(*inputs.astype(float), **motion, derivatives=derivatives)
+            batch = closure.solve(
+                *inputs.astype(float),
+                rates=given[0],
+                accelerations=given[1],
+                derivatives=derivatives,
+            )
     except Exception as error:  # noqa: BLE001 - any exception is counted
         findings.find('traceback: solve', f'derivatives={derivatives}: {error!r}')
         return
@@ -199,7 +204,7 @@ def _compare_arrays(
             findings.find('arrays: status', note)
             continue
         for name, one, many in zip(QUANTITIES, joints, batch[1:], strict=False):
-            if not one:
+            if not one or many is None:
                 continue
             off = np.abs(many[:, k] - np.array(one))
             # Far from a toggle the two differ by rounding only.
@@ -291,7 +296,7 @@ def _other_pose(
 
 
 def _compare_points(
-    closure: Closure,
+    closure: Any,
     equations: Equations,
     motion: Motion,
     position: Any,

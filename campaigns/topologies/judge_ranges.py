@@ -206,7 +206,7 @@ def _travel(geometry: Geometry, start: float, far: float, turning: bool) -> Trav
     samples = _samples(start, far, turning)
     spare = _spare_at(geometry, samples)
     values = np.union1d(samples, _turning_points(geometry, samples, spare))
-    closes = (_spare_at(geometry, values) >= -_FLAT).all(0)
+    closes = np.asarray((_spare_at(geometry, values) >= -_FLAT).all(0))
     borders = [i for i in range(len(values) - 1) if closes[i] != closes[i + 1]]
     inner = np.array([values[i] if closes[i] else values[i + 1] for i in borders])
     outer = np.array([values[i + 1] if closes[i] else values[i] for i in borders])
@@ -228,7 +228,7 @@ def _travel(geometry: Geometry, start: float, far: float, turning: bool) -> Trav
     # Lines may be parallel between an end and the next sample.
     fine = np.sort(np.concatenate([values, inner]))
     there = geometry.place(fine[None, :].astype(Real))
-    open_ones = (_spare(there.margins, len(fine)) < -_FLAT).any(0)
+    open_ones = np.asarray((_spare(there.margins, len(fine)) < -_FLAT).any(0))
     parallels = _parallel(geometry, there.crossings, fine, ~open_ones)
     # Near parallel lines a dyad is far away, and its lengths are small relative to that.
     changes = _flat(geometry, samples, spare, [*ends, *parallels], turning)
@@ -282,7 +282,7 @@ def _flat(
 ) -> list[float]:
     """Return where the margin of a dyad is zero within a range."""
     found: list[float] = []
-    closes = (spare >= -_FLAT).all(0)
+    closes = np.asarray((spare >= -_FLAT).all(0))
     for k, row in enumerate(spare):
         # At an end of the samples of a slide a zero margin may be an end of the range.
         for i in range(0 if turning else 1, len(row) - (0 if turning else 1)):

@@ -251,13 +251,15 @@ class TopologyBuilder(Builder):
                 line = polar(1.0, self.direction())
                 through = self.name('Q')
                 self.put(known, through, corner - line * self.length())
-                self._joints[slide] = (slide := self.slide(line, known, through, name, None))
+                slide = self.slide(line, known, through, name, None)
+                self._joints[slide] = slide
             elif leg == 'RP':
                 end, line = self.spot(known), polar(1.0, self.direction())
                 rail = self.link('rail', {end.point: self.where(end)}, axis=line)
                 through = self.name('Q')
                 self.put(rail, through, corner - line * self.length())
-                self._joints[slide] = (slide := self.slide(line, rail, through, name, platform))
+                slide = self.slide(line, rail, through, name, platform)
+                self._joints[slide] = slide
                 new.append(rail)
             else:
                 end = self.spot(known)
