@@ -16,6 +16,7 @@ import multiprocessing
 from operator import itemgetter
 from pathlib import Path
 import time
+import traceback
 from typing import NamedTuple, TypeVar
 
 from bench.report import say, show, Table, write_page
@@ -109,8 +110,11 @@ def tallies_of(judge: Judge, work: Sequence[Part], jobs: int, unit: str = '') ->
 
 def _tally_of(judge: Judge, part: Part) -> tuple[Part, Tally]:
     tally = Tally()
-    for number, judged in judge(part):
-        tally.add(number, judged)
+    try:
+        for number, judged in judge(part):
+            tally.add(number, judged)
+    except Exception as error:
+        raise RuntimeError(f'{part}: {traceback.format_exc()}') from error
     return part, tally
 
 

@@ -23,7 +23,7 @@ import random
 from typing import NamedTuple
 
 from campaigns.accuracy.dyads import PRP, RPP, RPR, RRP, RRR
-from campaigns.accuracy.mechanism import CRANK, GROUND, Mechanism, polar, Slide, Spot, Tie, Turn
+from campaigns.accuracy.mechanism import CRANK, Mechanism, polar, Spot, Tie
 from campaigns.accuracy.random_families import (
     add_random,
     add_rpr,
@@ -34,6 +34,7 @@ from campaigns.accuracy.random_families import (
     DYADS,
     start,
 )
+from linkage_ros.kinematics import GROUND, RevoluteJoint, SlideJoint, Slider
 import numpy as np
 
 A, B, C, D = ('crank', 'A', 'x'), ('coupler', 'B', 'x'), ('rocker', 'B', 'x'), ('ground', 'D', 'x')
@@ -73,7 +74,10 @@ def four_bar(
         },
         {},
         (RRR('coupler', 'rocker', Spot(CRANK, 'A'), Spot(GROUND, 'D'), 'B', side, fold, stretch),),
-        {'coupler_joint': Turn(GROUND, 'coupler'), 'rocker_joint': Turn(GROUND, 'rocker')},
+        {
+            'coupler_joint': RevoluteJoint(GROUND, 'coupler'),
+            'rocker_joint': RevoluteJoint(GROUND, 'rocker'),
+        },
         ties,
     )
 
@@ -86,9 +90,9 @@ def slider_crank(a: float, b: float, offset: float, side: int) -> Mechanism:
             CRANK: {'O': (0.0, 0.0), 'A': (a, 0.0)},
             'rod': {'A': (0.0, 0.0), 'B': (b, 0.0)},
         },
-        {'slide': Slide('B', GROUND, 'Q', (1.0, 0.0))},
+        {'slide': Slider('B', GROUND, 'Q', (1.0, 0.0))},
         (RRP('rod', Spot(CRANK, 'A'), 'B', 'slide', side),),
-        {'rod_joint': Turn(GROUND, 'rod'), 'slide_joint': 'slide'},
+        {'rod_joint': RevoluteJoint(GROUND, 'rod'), 'slide_joint': SlideJoint('slide')},
     )
 
 
@@ -122,9 +126,9 @@ def inverted_slider_crank(
             CRANK: {'O': (0.0, 0.0), 'A': (a, 0.0)},
             'rod': {'A': (0.0, 0.0), 'Q': (0.0, offset)} if offset else {'A': (0.0, 0.0)},
         },
-        {'slide': Slide('D', 'rod', 'Q' if offset else 'A', (1.0, 0.0))},
+        {'slide': Slider('D', 'rod', 'Q' if offset else 'A', (1.0, 0.0))},
         (RPR('rod', Spot(CRANK, 'A'), Spot(GROUND, 'D'), 'slide', side, fold),),
-        {'rod_joint': Turn(GROUND, 'rod'), 'slide_joint': 'slide'},
+        {'rod_joint': RevoluteJoint(GROUND, 'rod'), 'slide_joint': SlideJoint('slide')},
         ties,
     )
 
@@ -168,11 +172,11 @@ def _scotch_yoke(rng: random.Random, small: float) -> Mechanism:
             'yoke': {'C': (0.0, 0.0), 'S': (length(rng), -length(rng))},
         },
         {
-            'guide': Slide('C', GROUND, 'Q', (1.0, 0.0), 'yoke'),
-            'slot': Slide('A', 'yoke', 'S', (1.0, small)),
+            'guide': Slider('C', GROUND, 'Q', (1.0, 0.0), 'yoke'),
+            'slot': Slider('A', 'yoke', 'S', (1.0, small)),
         },
         (RPP(Spot(CRANK, 'A'), 'slot', 'guide'),),
-        {'yoke_joint': 'guide', 'slot_joint': 'slot'},
+        {'yoke_joint': SlideJoint('guide'), 'slot_joint': SlideJoint('slot')},
     )
 
 
@@ -185,11 +189,11 @@ def _crossed_slots(rng: random.Random, small: float) -> Mechanism:
             'block': {'B': (0.0, 0.0)},
         },
         {
-            'guide': Slide('B', GROUND, 'Q', (1.0, 0.0), 'block'),
-            'slot': Slide('B', CRANK, 'S', (1.0, small)),
+            'guide': Slider('B', GROUND, 'Q', (1.0, 0.0), 'block'),
+            'slot': Slider('B', CRANK, 'S', (1.0, small)),
         },
         (PRP('guide', 'slot', 'B'),),
-        {'block_joint': 'guide', 'slot_joint': 'slot'},
+        {'block_joint': SlideJoint('guide'), 'slot_joint': SlideJoint('slot')},
     )
 
 

@@ -95,7 +95,7 @@ class RPR(_Dyad):
         unit = diagonal / ((reach + height * 1j) * motion.directions[self.slider])
         motion.place(self.rail, unit, self.a.point, start)
         block = motion.mechanism.sliders[self.slider].block
-        if block is not None:
+        if block:
             twist = motion.twists[self.slider]
             # The block turns with the rail, whose angle is passed on once.
             motion.place(block, motion.unit[self.rail] * twist, self.d.point, end)
@@ -269,7 +269,7 @@ class RPP(_Dyad):
         over = _meet(rest, slot, line)
         motion.slide[self.inner], motion.slide[self.outer] = over
         motion.ride(self.outer, unit, outer.point, base + line * over[1])
-        if inner.block is not None:
+        if inner.block:
             turned = unit * motion.twists[self.inner]
             motion.place(inner.block, turned, self.a.point, start)
 
@@ -285,7 +285,7 @@ def _pin_at_zero(motion: Motion, slider: str, origin: str, pin: str) -> Series:
     """Return a pin of a slider's block at a slide of 0, from the origin of the slider's link."""
     slide = motion.mechanism.sliders[slider]
     place = motion.vector(slide.along, origin, slide.through)
-    if slide.block is None or slide.point == pin:
+    if not slide.block or slide.point == pin:
         return place
     return place + motion.vector(slide.block, slide.point, pin) * motion.twists[slider]
 

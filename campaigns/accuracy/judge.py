@@ -16,7 +16,7 @@ from itertools import product
 from math import isfinite, pi
 from typing import Any
 
-from campaigns.accuracy.mechanism import Mechanism, Turn
+from campaigns.accuracy.mechanism import Mechanism
 from campaigns.accuracy.reference import (
     Array,
     condition_numbers,
@@ -29,7 +29,7 @@ from campaigns.series import CORRECT, FACTORIALS, UNIT_ROUNDOFF
 from campaigns.tally import Judgement, QUANTITIES
 from flint import arb, ctx
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import Closure, Status
+from linkage_ros.kinematics import Closure, RevoluteJoint, Status
 import numpy as np
 
 FAULTS = ('wrong', 'missed', 'false', 'refused', 'crashed')
@@ -135,7 +135,7 @@ def _measure(
         off, width, zero = _differences(reference, truths[i], answer)
         # A published angle counts its turns, and is rounded relative to its size.
         for j, joint in enumerate(reference.mechanism.joints.values()):
-            if isinstance(joint, Turn):
+            if isinstance(joint, RevoluteJoint):
                 condition[j, 0] += max(0.0, abs(answer[0][j]) - pi)
         # The κ of a joint that does not move is 0, but its terms are not 0 and are rounded.
         condition[zero] = np.maximum(condition[zero], 1.0)
@@ -168,7 +168,7 @@ def _differences(reference: Reference, truth: Truth, answer: Answer) -> tuple[Ar
     zero = np.zeros((len(truth.joints), 3), bool)
     joints = reference.mechanism.joints.values()
     for j, (joint, value) in enumerate(zip(joints, truth.joints, strict=True)):
-        turns = isinstance(joint, Turn)
+        turns = isinstance(joint, RevoluteJoint)
         for k, numbers in enumerate(answer):
             if not isfinite(numbers[j]):
                 off[j, k] = np.inf

@@ -21,9 +21,16 @@ from dataclasses import dataclass
 from math import cos, sin
 from typing import Any, NamedTuple, Protocol
 
-from linkage_ros.kinematics import Input, Linkage, RevoluteJoint, Side, SlideJoint, Slider
+from linkage_ros.kinematics import (
+    GROUND,
+    Input,
+    Linkage,
+    RevoluteJoint,
+    Side,
+    SlideJoint,
+    Slider,
+)
 
-GROUND = 'ground'
 CRANK = 'crank'
 
 Key = tuple[str, str, str]
@@ -35,24 +42,6 @@ class Spot(NamedTuple):
 
     link: str
     point: str
-
-
-class Slide(NamedTuple):
-    """A point of a link on a line of another; as `linkage_ros.kinematics.plane.linkage.Slider`."""
-
-    point: str
-    along: str
-    through: str
-    direction: tuple[float, float]
-    block: str | None = None
-    angle: float = 0.0
-
-
-class Turn(NamedTuple):
-    """A published angle: the angle of the child relative to the parent."""
-
-    parent: str
-    child: str
 
 
 class Dyad(Protocol):
@@ -87,9 +76,9 @@ class Mechanism:
 
     # As in a linkage file.
     links: Mapping[str, Mapping[str, tuple[float, float]]]
-    sliders: Mapping[str, Slide]
+    sliders: Mapping[str, Slider]
     dyads: tuple[Dyad, ...]  # In the order in which they are solved
-    joints: Mapping[str, Turn | str]  # The published joint: an angle, or the name of a slider
+    joints: Mapping[str, RevoluteJoint | SlideJoint]
     # For dependent lengths, as in a parallelogram, their independent changes; None: each number
     # changes independently.
     ties: tuple[Tie, ...] | None = None
@@ -100,11 +89,8 @@ class Mechanism:
             links=self.links,
             inputs=(Input('crank_joint', GROUND, CRANK),),
             assembly=dict(dyad.assembly for dyad in self.dyads if dyad.assembly),
-            joints={
-                name: SlideJoint(joint) if isinstance(joint, str) else RevoluteJoint(*joint)
-                for name, joint in self.joints.items()
-            },
-            sliders={name: Slider(**slide._asdict()) for name, slide in self.sliders.items()},
+            joints=self.joints,
+            sliders=self.sliders,
         )
 
     def numbers(self) -> dict[Key, float]:

@@ -20,9 +20,10 @@ from collections.abc import Mapping
 from math import frexp, pi, remainder
 from typing import Any
 
-from campaigns.accuracy.mechanism import CRANK, GROUND, Key, Mechanism, Spot
+from campaigns.accuracy.mechanism import CRANK, Key, Mechanism, Spot
 from campaigns.series import FACTORIALS, Series, Tape
 from flint import arb
+from linkage_ros.kinematics import GROUND, SlideJoint
 
 
 class OpenError(Exception):
@@ -163,7 +164,7 @@ class Motion:
             line = self.unit[slide.along] * self.directions[slider]
             change = self.tape.change(self._sizes(self.slide[slider]))
             where += line * change
-        self.place(str(slide.block), unit, point, where)
+        self.place(slide.block, unit, point, where)
 
     def _sizes(self, passed: Series) -> list[float]:
         """Return the size and the condition number of a passed result, in each order."""
@@ -183,8 +184,8 @@ class Motion:
         """Return the published joints, each with the absolute values of its terms, in order."""
         found = []
         for joint in self.mechanism.joints.values():
-            if isinstance(joint, str):
-                slide = self.slide[joint]
+            if isinstance(joint, SlideJoint):
+                slide = self.slide[joint.slider]
                 found.append((slide, [abs(float(order)) for order in slide.orders()]))
                 continue
             unit, terms = self.unchanged[joint.child], [pi, 0.0, 0.0]
@@ -207,7 +208,7 @@ class Motion:
         start = self.at(Spot(slide.along, slide.through))
         unit = self.unit[slide.along]
         direction = unit * self.directions[name]
-        if slide.block is None:
+        if not slide.block:
             return start, direction, None
         turned = unit * self.twists[name]
         if point != slide.point:

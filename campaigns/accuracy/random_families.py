@@ -23,8 +23,9 @@ from math import pi
 import random
 
 from campaigns.accuracy.dyads import PRP, RPP, RPR, RRP, RRR
-from campaigns.accuracy.mechanism import CRANK, Dyad, GROUND, Mechanism, polar, Slide, Spot, Turn
+from campaigns.accuracy.mechanism import CRANK, Dyad, Mechanism, polar, Spot
 from flint import arb
+from linkage_ros.kinematics import GROUND, RevoluteJoint, SlideJoint, Slider
 
 
 class Builder:
@@ -38,9 +39,9 @@ class Builder:
         self.offset = 1.0
         self._frames: dict[str, tuple[complex, complex]] = {GROUND: (0j, 1 + 0j)}
         self._links: dict[str, dict[str, tuple[float, float]]] = {GROUND: {}}
-        self._sliders: dict[str, Slide] = {}
+        self._sliders: dict[str, Slider] = {}
         self._dyads: list[Dyad] = []
-        self._joints: dict[str, Turn | str] = {}
+        self._joints: dict[str, RevoluteJoint | SlideJoint] = {}
         self._names = 0
 
     def mechanism(self) -> Mechanism:
@@ -125,7 +126,7 @@ class Builder:
             self._links[name][list(pins)[1]] = (abs(others[0] - first), 0.0)
         return name
 
-    def slide(self, line: complex, along: str, through: str, point: str, block: str | None) -> str:
+    def slide(self, line: complex, along: str, through: str, point: str, block: str) -> str:
         """Add a slider whose line has a direction in the pose."""
         name = self.name('s')
         unit = self._frames[along][1]
@@ -135,16 +136,16 @@ class Builder:
             local = complex(round(local.real))
         elif not self.plain:
             local *= self.length()
-        if block is not None and not self.plain:
+        if block and not self.plain:
             angle = phase(self._frames[block][1] * unit.conjugate())
-        self._sliders[name] = Slide(point, along, through, (local.real, local.imag), block, angle)
+        self._sliders[name] = Slider(point, along, through, (local.real, local.imag), block, angle)
         return name
 
     def axis(self, link: str) -> complex:
         """Return the direction of a link's x axis in the pose."""
         return self._frames[link][1]
 
-    def add(self, dyad: Dyad, *joints: Turn | str) -> None:
+    def add(self, dyad: Dyad, *joints: RevoluteJoint | SlideJoint) -> None:
         """Add a dyad and its published joints."""
         self._dyads.append(dyad)
         for joint in joints:
@@ -178,7 +179,7 @@ def add_rrr(
     dyad = RRR(one, two, a, d, name, 1, fold, stretch)
     # RRR wants the side for 0 < φ < π.
     dyad = replace(dyad, side=side * dyad.side_at(arb(build.phi)))
-    build.add(dyad, Turn(build.parent(), one), Turn('ground', two))
+    build.add(dyad, RevoluteJoint(build.parent(), one), RevoluteJoint('ground', two))
     return [one, two]
 
 
@@ -193,7 +194,9 @@ def add_rrp(build: Builder, a: Spot, along: str) -> list[str]:
     through = _through(build, along, on_line, line)
     slider = build.slide(line, along, through, point, block)
     side = 1 if ((where - start) * line.conjugate()).real > 0 else -1
-    build.add(RRP(one, a, pin, slider, side), Turn(build.parent(), one), slider)
+    build.add(
+        RRP(one, a, pin, slider, side), RevoluteJoint(build.parent(), one), SlideJoint(slider)
+    )
     return [link for link in (one, block) if link]
 
 
@@ -209,12 +212,14 @@ def add_rpr(build: Builder, a: Spot, d: Spot) -> list[str]:
     through = a.point
     if not (straight and build.plain):
         through = _through(build, rail, on_line, line)
-    elif block is not None:
+    elif block:
         # With another point of the block the line would not pass through the swivel.
         point = d.point
     slider = build.slide(line, rail, through, point, block)
     side = 1 if ((end - start) * line.conjugate()).real > 0 else -1
-    build.add(RPR(rail, a, d, slider, side), Turn(build.parent(), rail), slider)
+    build.add(
+        RPR(rail, a, d, slider, side), RevoluteJoint(build.parent(), rail), SlideJoint(slider)
+    )
     return [link for link in (rail, block) if link]
 
 
@@ -230,7 +235,7 @@ def add_prp(build: Builder, known: str, other: str) -> list[str]:
         links.append(block)
         through = _through(build, along, on_line, line)
         sliders.append(build.slide(line, along, through, point, block))
-    build.add(PRP(sliders[0], sliders[1], pin), *sliders)
+    build.add(PRP(sliders[0], sliders[1], pin), *map(SlideJoint, sliders))
     return [link for link in links if link]
 
 
@@ -248,17 +253,17 @@ def add_rpp(build: Builder, a: Spot, along: str) -> list[str]:
     if build.plain and build.rng.random() < 0.5:
         slot = line * 1j
     inner = build.slide(slot, yoke, _through(build, yoke, on_line, slot), point, block)
-    build.add(RPP(a, inner, outer), inner, outer)
+    build.add(RPP(a, inner, outer), SlideJoint(inner), SlideJoint(outer))
     return [link for link in (yoke, block) if link]
 
 
 def _perhaps_block(
     build: Builder, pin: str, where: complex, along: str, *, always: bool = False
-) -> tuple[str | None, str, complex]:
+) -> tuple[str, str, complex]:
     """Return a new block as `_block` does, or none: then the pin itself is on the line."""
     if always or build.rng.random() < 0.5:
         return _block(build, pin, where, along)
-    return None, pin, where
+    return '', pin, where
 
 
 def _through(build: Builder, along: str, on_line: complex, line: complex) -> str:

@@ -38,7 +38,7 @@ from campaigns.accuracy.reference import condition_numbers, margins, Reference
 from campaigns.campaign import Findings, Page, Part, parts_of, show_results, tallies_of
 from campaigns.series import FACTORIALS, UNIT_ROUNDOFF
 from campaigns.tally import edges, Judgement, OCTAVE, QUANTITIES, Tally
-from linkage_ros.kinematics import Closure
+from linkage_ros.kinematics import Closure, SlideJoint
 import numpy as np
 
 PAGE = Page(
@@ -278,7 +278,7 @@ def _show_case(reference: Reference, phi: float, alpha: float) -> None:
         return
     kappa = UNIT_ROUNDOFF * condition_numbers(truth)
     for j, (name, joint) in enumerate(reference.mechanism.joints.items()):
-        size = 2.0**truth.motion.exponent if isinstance(joint, str) else 1.0
+        size = 2.0**truth.motion.exponent if isinstance(joint, SlideJoint) else 1.0
         for k, (quantity, found) in enumerate(zip(QUANTITIES, answer, strict=False)):
             exact = float(truth.joints[j][k]) * FACTORIALS[k] * size
             ours = found[j] if found else None

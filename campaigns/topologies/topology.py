@@ -22,13 +22,13 @@ from __future__ import annotations
 
 from cmath import phase
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import tau
 import random
 from typing import Any, NamedTuple
 
 from campaigns.accuracy.dyads import PRP, RPP, RPR, RRP, RRR
-from campaigns.accuracy.mechanism import Dyad, polar, Spot, Turn
+from campaigns.accuracy.mechanism import Dyad, polar, Spot
 from campaigns.accuracy.random_families import add_random, Builder
 from campaigns.topologies.constraints import Array, Equations, Real
 from campaigns.topologies.geometry import DrivenLink, DrivenRRR, Group, Passing
@@ -40,7 +40,6 @@ from linkage_ros.kinematics import (
     RevoluteJoint,
     Side,
     SlideJoint,
-    Slider,
 )
 import numpy as np
 
@@ -84,7 +83,7 @@ class TopologyBuilder(Builder):
         """Return the parent link for a published angle; `topology` publishes all angles anyway."""
         return GROUND
 
-    def add(self, dyad: Dyad, *joints: Turn | str) -> None:
+    def add(self, dyad: Dyad, *joints: RevoluteJoint | SlideJoint) -> None:
         """Add a dyad with its assembly as the conventions name it."""
         super().add(dyad, *joints)
         group: Any = dyad
@@ -96,12 +95,12 @@ class TopologyBuilder(Builder):
             self._assembly[group.slider] = 'ahead' if group.side > 0 else 'behind'
         self._known(group)
 
-    def slide(self, line: complex, along: str, through: str, point: str, block: str | None) -> str:
+    def slide(self, line: complex, along: str, through: str, point: str, block: str) -> str:
         """Add a slider by its direction in the pose; its block may have any angle to the line."""
         name = super().slide(line, along, through, point, block)
-        if block is not None and self.axis(block) != self.axis(along):
+        if block and self.axis(block) != self.axis(along):
             turn = phase(self.axis(block) * self.axis(along).conjugate())
-            self._sliders[name] = self._sliders[name]._replace(angle=turn)
+            self._sliders[name] = replace(self._sliders[name], angle=turn)
         return name
 
     def _name_side(self, ends: tuple[Spot, Spot], links: tuple[str, str], pin: str) -> None:
@@ -193,7 +192,6 @@ class TopologyBuilder(Builder):
         between = self.where(Spot(block, point)) - self.where(Spot(along, through))
         self._start.append((between * line.conjugate()).real)
         self._step.append(0.3 * abs(between))
-        self._joints[name] = name
 
     def dyad(self, kind: str, known: str, other: str) -> list[str]:
         """Add a random dyad between two links; the first one carries the pin of a rail."""
@@ -251,15 +249,13 @@ class TopologyBuilder(Builder):
                 line = polar(1.0, self.direction())
                 through = self.name('Q')
                 self.put(known, through, corner - line * self.length())
-                slide = self.slide(line, known, through, name, None)
-                self._joints[slide] = slide
+                self.slide(line, known, through, name, '')
             elif leg == 'RP':
                 end, line = self.spot(known), polar(1.0, self.direction())
                 rail = self.link('rail', {end.point: self.where(end)}, axis=line)
                 through = self.name('Q')
                 self.put(rail, through, corner - line * self.length())
-                slide = self.slide(line, rail, through, name, platform)
-                self._joints[slide] = slide
+                self.slide(line, rail, through, name, platform)
                 new.append(rail)
             else:
                 end = self.spot(known)
@@ -292,17 +288,7 @@ class TopologyBuilder(Builder):
                 tuple(self.inputs),
                 dict(self._assembly),
                 joints,
-                {
-                    name: Slider(
-                        slide.point,
-                        slide.along,
-                        slide.through,
-                        slide.direction,
-                        slide.block or '',
-                        slide.angle,
-                    )
-                    for name, slide in self._sliders.items()
-                },
+                dict(self._sliders),
                 pose=pose if with_pose else None,
             ),
             None if iterated else tuple(self._groups),

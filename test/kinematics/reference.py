@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 from campaigns.accuracy import adversarial
 from campaigns.accuracy.mechanism import Mechanism
 from campaigns.accuracy.reference import condition_numbers, Outcome, Reference
-from linkage_ros.kinematics import Status
+from linkage_ros.kinematics import SlideJoint, Status
 from mpmath import mp, mpf
 
 UNIT_ROUNDOFF = 2.0**-53
@@ -125,7 +125,7 @@ def _solve(mechanism: Mechanism, phi: float, digits: int) -> list[Any]:
             return [-number(dyad.margin(truth.motion).orders()[0]) * unit]
         if truth.outcome is Outcome.SINGULAR:
             return [mpf(0), Quantity(mpf(0), inf), Quantity(mpf(0), inf)]
-        slides = [isinstance(joint, str) for joint in mechanism.joints.values()]
+        slides = [isinstance(joint, SlideJoint) for joint in mechanism.joints.values()]
         values = [
             number(series[order]) * (1, 1, 2)[order] * (unit if sliding else 1)
             for order in range(3)
