@@ -24,20 +24,13 @@ import random
 
 from bench import ROOT
 from bench.report import Table
+from campaigns.accuracy.adversarial import four_bar
 from campaigns.accuracy.random_families import DYADS
 from campaigns.campaign import Findings, Page, progress_lines
 from campaigns.topologies.topology import TopologyBuilder
 from linkage_ros.description import load
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import (
-    Closure,
-    CrankBranch,
-    GROUND,
-    Input,
-    is_iterated,
-    Linkage,
-    RevoluteJoint,
-)
+from linkage_ros.kinematics import Closure, CrankBranch, GROUND, is_iterated
 from linkage_ros.resources import linkage_names, named_file
 import numpy as np
 
@@ -106,22 +99,7 @@ def random_four_bars(count: int, rng: random.Random) -> Iterator[Closure]:
     """Yield four-bars of all kinds."""
     while count:
         a, b, c, d = (rng.uniform(0.2, 1.0) for _ in range(4))
-        linkage = Linkage(
-            links={
-                'ground': {'O': (0.0, 0.0), 'D': (d, 0.0)},
-                'crank': {'O': (0.0, 0.0), 'A': (a, 0.0)},
-                'coupler': {'A': (0.0, 0.0), 'B': (b, 0.0)},
-                'rocker': {'D': (0.0, 0.0), 'B': (c, 0.0)},
-            },
-            inputs=(Input('crank_joint', 'ground', 'crank'),),
-            assembly={'B': 'left' if rng.random() < 0.5 else 'right'},
-            joints={
-                'coupler_joint': RevoluteJoint('crank', 'coupler'),
-                'rocker_joint': RevoluteJoint('ground', 'rocker'),
-            },
-            sliders={},
-        )
-        closure = Closure(linkage)
+        closure = Closure(four_bar((a, b, c, d), rng.choice((1, -1))).linkage())
         if closure.input_ranges:
             count -= 1
             yield closure

@@ -26,14 +26,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import metadata
 from math import acos, cos, hypot, pi, sin
 from random import Random
-import time
 from typing import Any, NamedTuple
 
 from bench.report import say, show as show_table, Table
 from campaigns.campaign import Findings, Part, parts_of, tallies_of
 from campaigns.tally import Judgement, Quantity, Tally
 from flint import arb, arb_mat, ctx
-from linkage_ros.tools.design import solve_links, three_pairs
+from linkage_ros.tools.design import three_pairs
 from linkage_ros.tools.design.pairs.freudenstein import TRUSTED
 import numpy as np
 
@@ -53,15 +52,8 @@ def truth(lengths: Sequence[float], crank: Sequence[float], sides: Sequence[int]
     """
     Return the rocker angles and the sensitivity of the lengths; None where the loop is open.
 
-    Parameters
-    ----------
-    lengths
-        Of crank, coupler and rocker, the first and the last signed; the ground is 1.
-    crank
-        Three crank angles, in [rad].
-    sides
-        The assembly at each: 1 if the pin B lies left of A→O4, −1 if right.
-
+    The lengths are those of crank, coupler and rocker, the first and the last signed, for a ground
+    of 1. At each of three crank angles the side is 1 if the pin B lies left of A→O4, −1 if right.
     """
     ctx.prec = PRECISION
     a, b, c = map(arb, lengths)
@@ -361,14 +353,13 @@ def run(options: argparse.Namespace) -> Findings:
     facts = ('cases', cases), ('python-flint', metadata.version('python-flint'))
     families = [(name, family.description) for name, family in FAMILIES.items()]
     named = Table('Families', ('family', 'description'), [*families])
-    tables = [_errors(tallies), named, _speed()]
     faults = [
         f'{family}: {name} {errors.greatest():.3g} of linkage {linkage_of(errors)}'
         for family, tally in tallies.items()
         for name, most in ((WORST, TRUSTED), (LOST, 1.0))
         if (errors := tally.quantities.get(name, Quantity())).greatest() > most
     ]
-    return Findings(tables, faults, facts)
+    return Findings([_errors(tallies), named], faults, facts)
 
 
 def linkage_of(errors: Quantity) -> int:
@@ -401,20 +392,6 @@ def _errors(tallies: Mapping[str, Tally]) -> Table:
                 f'{lost.greatest():.2f}',
             ]
         )
-    return table
-
-
-def _speed() -> Table:
-    """Measure three-pair designs per second on one core, as a search makes them."""
-    angles = np.random.default_rng(1).uniform(-np.pi, np.pi, (2, 262_144, 3))
-    table = Table('Designs from three pairs, on one core', ('', 'million/s'))
-    for name, solve in (('lengths', solve_links), ('with condition and sensitivity', three_pairs)):
-        best = np.inf
-        for _ in range(3):
-            start = time.perf_counter()
-            solve(*angles)
-            best = min(best, time.perf_counter() - start)
-        table.rows.append([name, f'{angles.shape[1] / best / 1e6:.2f}'])
     return table
 
 

@@ -50,19 +50,10 @@ def four_bar(
     ties: tuple[Tie, ...] | None = None,
 ) -> Mechanism:
     """
-    Return a four-bar.
+    Return a four-bar of crank a, coupler b, rocker c, ground d; +1: B lies left of A→D, -1: right.
 
-    Parameters
-    ----------
-    lengths
-        Crank a, coupler b, rocker c, ground d.
-    side
-        +1: B lies left of A→D, -1: right.
-    fold, stretch
-        Whether it passes change points where the crank lies along the ground.
-    ties
-        The changes of its dependent lengths.
-
+    It may pass change points where the crank lies along the ground: fold, stretch. ``ties`` are
+    the changes of its dependent lengths.
     """
     a, b, c, d = lengths
     return Mechanism(
@@ -106,18 +97,10 @@ def inverted_slider_crank(
     """
     Return a crank with a rod that slides through a swivel.
 
-    Parameters
-    ----------
-    lengths
-        Crank a, ground d to the swivel, and the distance from the crank's pin to the rod's line,
-        positive to the left.
-    side
-        +1: the swivel lies ahead of the crank's pin along the rod, -1: behind.
-    fold
-        Whether the pins coincide when the crank lies along the ground; the side changes there.
-    ties
-        The changes of its dependent lengths.
-
+    Its lengths are crank a, ground d to the swivel, and the distance from the crank's pin to the
+    rod's line, positive to the left. At +1 the swivel lies ahead of the crank's pin along the rod,
+    at -1 behind; with ``fold`` the pins coincide when the crank lies along the ground, and the
+    side changes there.
     """
     a, d, offset = lengths
     return Mechanism(

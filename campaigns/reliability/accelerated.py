@@ -21,7 +21,6 @@ from functools import partial
 from math import cos, sin, tau
 import multiprocessing
 from pathlib import Path
-import re
 from tempfile import TemporaryDirectory
 import time
 from typing import Any, NamedTuple
@@ -30,14 +29,13 @@ from bench.report import say, Table
 from campaigns.campaign import progress_lines
 from campaigns.reliability.judge import shortcomings
 from campaigns.reliability.memory import nearest, Usage, usage, verdict_table
-from campaigns.reliability.recording import JOINT_STATE, START, wait_for
+from campaigns.reliability.recording import START, wait_for
 from linkage_ros.bag import BagWriter, Recorder, RecordingSummary, Storage, Topic
 from linkage_ros.description import load_scene
 from linkage_ros.messages import JointStateWriter, NANOSECONDS
-from linkage_ros.tick import Pipeline, TickLoop
+from linkage_ros.tick import list_run_topics, Pipeline, TickLoop
 from rosbags.typesys import get_typestore, Stores
 
-SCENES = Path(__file__).parents[2] / 'config' / 'scenes'
 _SPEED = 0.5  # of the crank [turns/s]
 _BURST = 500  # ticks between two checks of the queue
 _FLUSH_PERIOD = 0.004
@@ -85,8 +83,7 @@ def run(plan: Plan) -> Run:
 
 
 def _run(plan: Plan, folder: Path) -> Run:
-    file = changed_scene(folder, plan.scene, r'^rate: [\d.]+', f'rate: {plan.rate:g}')
-    scene = load_scene(file)
+    scene = load_scene(plan.scene, [f'rate={plan.rate:g}'])
     pending: list[tuple[bytes, dict[str, Any]]] = []
     take = partial(_take, pending)
     pipeline = Pipeline(scene)
@@ -147,32 +144,20 @@ def _crank_at(seconds: float) -> tuple[float, float]:
     return turns + 0.3 * sin(turns), tau * _SPEED * (1.0 + 0.3 * cos(turns))
 
 
-def changed_scene(folder: Path, name: str, pattern: str, by: str) -> Path:
-    """Write a scene that comes with the package, with another line; return its file."""
-    text = (SCENES / f'{name}.yaml').read_text()
-    text = re.sub(pattern, by, text, flags=re.MULTILINE)
-    file = folder / f'{name}.yaml'
-    file.write_text(text.replace('../linkages', str(SCENES.parent / 'linkages')))
-    return file
-
-
 def _topics(pipeline: Pipeline) -> list[Topic]:
     """Describe the topics in the order of the tick loop's numbers."""
-    kinds = {
-        '/joint_states': JOINT_STATE,
-        '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
-    }
-    if pipeline.topic:
-        kinds['/crank_states'] = JOINT_STATE
-    if pipeline.suppresses_ticks:
-        kinds['/linkage_node/withheld'] = 'builtin_interfaces/msg/Time'
-    kinds |= {
-        extra.topic.replace('~', '/linkage_node'): extra.message for extra in pipeline.extras
-    }
     store = get_typestore(Stores.ROS2_JAZZY)
+    topics = [
+        (each.name.replace('~', '/linkage_node'), each.type) for each in list_run_topics(pipeline)
+    ]
     return [
-        Topic(name, kind, store.generate_msgdef(kind, ros_version=2)[0], store.hash_rihs01(kind))
-        for name, kind in kinds.items()
+        Topic(
+            f'/{name}'.replace('//', '/'),
+            kind,
+            store.generate_msgdef(kind, ros_version=2)[0],
+            store.hash_rihs01(kind),
+        )
+        for name, kind in topics
     ]
 
 
@@ -199,22 +184,12 @@ def tables_of(runs: Sequence[Run]) -> list[Table]:
         for counts in run.summary.topics:
             numbers = (counts.received, counts.recorded, counts.dropped, counts.discarded)
             messages.rows.append([f'{run.plan.name}: {counts.name}', *(f'{n:,}' for n in numbers)])
-    took = Table(
-        f'{title}, duration',
-        ('', 'h', 'ticks', 's', 'µs a tick', 'faults'),
-        [
-            [
-                run.plan.name,
-                f'{run.plan.hours:g}',
-                f'{ticks:,}',
-                f'{run.seconds:.0f}',
-                f'{1e6 * run.seconds / ticks:.1f}',
-                '; '.join(run.faults) or 'none',
-            ]
-            for run in runs
-            for ticks in [round(run.plan.hours * 3600.0 * run.plan.rate)]
-        ],
-    )
+    took = Table(f'{title}, duration', ('', 'h', 'ticks', 's', 'µs a tick', 'faults'))
+    for run in runs:
+        ticks = round(run.plan.hours * 3600.0 * run.plan.rate)
+        pace, faults = f'{1e6 * run.seconds / ticks:.1f}', '; '.join(run.faults) or 'none'
+        counted = f'{run.plan.hours:g}', f'{ticks:,}', f'{run.seconds:.0f}', pace
+        took.rows.append([run.plan.name, *counted, faults])
     return [memory, verdicts, messages, took]
 
 

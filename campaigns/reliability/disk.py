@@ -202,7 +202,7 @@ def failing_tables(tried: Sequence[Tried]) -> list[Table]:
         group = [one for one in tried if one.setting == setting]
         if group:
             # The number of calls without a fault: a write in halves makes more.
-            calls = 1 + max(one.injection.number for one in group if one.injection)
+            calls = 1 + max((one.injection.number for one in group if one.injection), default=-1)
             _add(by_setting, f'{setting} ({calls} calls)', group)
     _add(by_setting, 'all', tried)
     by_call = _verdicts('Calls that fail, by call', 'call')

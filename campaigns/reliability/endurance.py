@@ -26,7 +26,7 @@ from typing import Any
 from bench.report import say, Table
 from campaigns.campaign import Findings, Page, progress_lines
 from campaigns.reliability import accelerated
-from campaigns.reliability.accelerated import changed_scene, MESSAGES
+from campaigns.reliability.accelerated import MESSAGES
 from campaigns.reliability.judge import Counts, counts_of, shortcomings
 from campaigns.reliability.memory import (
     flatness,
@@ -91,12 +91,9 @@ def run_over_dds(minutes: float) -> DdsRun:
     """
     with TemporaryDirectory(prefix='linkage_ros_endurance_') as name:
         folder = Path(name)
-        split_seconds = max(min(60.0, 6.0 * minutes), 1.0)
-        record = f'record: {{directory: {folder}, name: bag, split_seconds: {split_seconds:g}}}'
-        scene = changed_scene(folder, 'demo', 'record: {directory: runs}', record)
         done = DdsRun(minutes)
         try:
-            _record(folder, scene, done)
+            _record(folder, done)
         except MeasurementError as error:
             done.faults.append(str(error))
             return done
@@ -109,10 +106,11 @@ def run_over_dds(minutes: float) -> DdsRun:
         return done
 
 
-def _record(folder: Path, scene: Path, done: DdsRun) -> None:
+def _record(folder: Path, done: DdsRun) -> None:
     """Run node and source, sample the node's usage, and end both."""
     longest = 60.0 * done.minutes + 120
-    with recording_node(folder, scene, folder / 'bag', longest) as (graph, node):
+    split = f'split_seconds: {max(min(60.0, 6.0 * done.minutes), 1.0):g}'
+    with recording_node(folder, folder / 'bag', longest, 'demo', (), split) as (graph, node):
         source_arguments = ['--ros-args', '-p', f'rate:={_CRANK_RATE}.0']
         with graph.run_module('linkage_ros.node.crank_source', source_arguments) as source:
             begin = time.monotonic()

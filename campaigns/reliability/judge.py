@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 import json
 from operator import attrgetter
 from pathlib import Path
@@ -130,40 +131,22 @@ def read_metadata(folder: Path) -> Metadata:
     return Metadata(files, count, fault)
 
 
+@dataclass(frozen=True)
 class Expectation:
-    """
-    The expected outcome of a recording.
+    """The expected outcome of a recording."""
 
-    Parameters
-    ----------
-    messages
-        The offered messages, in order.
-    keeps_all
-        Whether the recording must not lose a message.
-    may_leave
-        Whether unwanted files may remain, because they could not be removed.
-    loses_pages
-        Whether data that was not flushed may be lost from the files; then only recovery is judged.
-    may_be_silent
-        Whether the metadata may lack the failure, because they were written before it.
+    messages: Sequence[BagMessage]  # The offered messages, in order
+    keeps_all: bool = False  # Whether the recording must not lose a message
+    # Whether unwanted files may remain, because they could not be removed.
+    may_leave: bool = False
+    # Whether data that was not flushed may be lost from the files; only recovery is judged then.
+    loses_pages: bool = False
+    # Whether the metadata may lack the failure, because they were written before it.
+    may_be_silent: bool = False
 
-    """
-
-    def __init__(
-        self,
-        messages: Sequence[BagMessage],
-        *,
-        keeps_all: bool = False,
-        may_leave: bool = False,
-        loses_pages: bool = False,
-        may_be_silent: bool = False,
-    ) -> None:
-        self.messages = messages
-        self.keeps_all = keeps_all
-        self.may_leave = may_leave
-        self.loses_pages = loses_pages
-        self.may_be_silent = may_be_silent
-        self._numbers = {(each.topic, each.log_time): at for at, each in enumerate(messages)}
+    @cached_property
+    def _numbers(self) -> dict[tuple[str, int], int]:
+        return {(each.topic, each.log_time): at for at, each in enumerate(self.messages)}
 
     def run_of(self, found: Sequence[BagMessage]) -> range | None:
         """Return the numbers of these consecutive messages, byte for byte; None if they differ."""

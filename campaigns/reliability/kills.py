@@ -137,11 +137,7 @@ class Marks(ctypes.Structure):
     ends_of_pauses: Any
     times: memoryview
     _fields_: ClassVar = [
-        ('state', ctypes.c_int64),
-        ('offered', ctypes.c_int64),
-        ('safe', ctypes.c_int64),
-        ('ticks', ctypes.c_int64),
-        ('pauses', ctypes.c_int64),
+        *((name, ctypes.c_int64) for name in ('state', 'offered', 'safe', 'ticks', 'pauses')),
         ('ends_of_pauses', 2 * ctypes.c_int64 * _MOST_PAUSES),
     ]
 
@@ -358,11 +354,6 @@ class KillError(Exception):
     """A recording ended before its kill."""
 
 
-def kill_all(work: Sequence[Plan], jobs: int) -> Iterator[Outcome]:
-    """Carry out plans, several at once; yield the outcomes."""
-    yield from results_of(kill, work, jobs)
-
-
 def kill(plan: Plan) -> Outcome:
     """Start a recording, kill it as planned, and judge."""
     with TemporaryDirectory(prefix='linkage_ros_kill_') as name:
@@ -479,7 +470,7 @@ def run(options: argparse.Namespace) -> Findings:
     outcomes = []
     progress = progress_lines(len(work), 'kills')
     try:
-        for outcome in kill_all(work, options.jobs):
+        for outcome in results_of(kill, work, options.jobs):
             outcomes.append(outcome)
             progress(1)
     except KillError as error:

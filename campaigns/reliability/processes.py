@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 import io
+import json
 import os
 from pathlib import Path
 import resource
@@ -154,27 +155,26 @@ def forked(do: Callable[[socket.socket], object]) -> Iterator[tuple[int, socket.
 
 @contextmanager
 def recording_node(
-    work: Path, scene: Path, bag: Path, longest: float, *slowed_by: str
+    work: Path,
+    bag: Path,
+    longest: float,
+    scene: str,
+    settings: Sequence[str],
+    record: str,
+    slowed_by: Sequence[str] = (),
 ) -> Iterator[tuple[Graph, Process]]:
     """
-    Run a node, on a graph of its own, from the beginning of its recording on.
+    Run a node with a scene and settings, on a graph of its own, from its recording on.
 
-    Parameters
-    ----------
-    work
-        The folder of its log.
-    scene, bag
-        The file of its scene and the folder of its bag.
-    longest
-        Time limit, in [s].
-    *slowed_by
-        Another module that runs the node, and its arguments before those of the node.
-
+    The folder ``work`` gets its log, ``longest`` is in [s], ``record`` are more keys of the
+    recording. ``slowed_by`` is another module that runs the node, and its arguments.
     """
+    recording = f'record={{directory: {bag.parent}, name: {bag.name}, {record}}}'
+    given = '-p', f'scene:={scene}', '-p', f'set:={json.dumps([*settings, recording])}'
     # Below 102, so that the ports stay below the kernel's ephemeral ones.
     graph = Graph(private_domain(), work, longest=round(longest))
     module, *arguments = slowed_by or ('linkage_ros.node.linkage_node',)
-    with graph.run_module(module, [*arguments, '--ros-args', '-p', f'scene:={scene}']) as node:
+    with graph.run_module(module, [*arguments, '--ros-args', *given]) as node:
         until = time.monotonic() + _START
         while not (bag / METADATA_FILE).exists() and time.monotonic() < until:
             node.check_running()

@@ -74,15 +74,9 @@ NumberedMessage = tuple[int, int, int, bytes]
 
 def message(number: int, time: int) -> NumberedMessage:
     """
-    Return a numbered message for the recorder; messages of the crank and joint states alternate.
+    Return a numbered message for the recorder, two for each tick: of the crank, of joint states.
 
-    Parameters
-    ----------
-    number
-        From 0; two for each tick.
-    time
-        Time at which it is offered, in [ns]; its bytes contain number and time.
-
+    Its bytes contain its number, from 0, and the time at which it is offered, in [ns].
     """
     topic = number % len(TOPICS)
     joints = (float(number), 0.1 * number)[: topic + 1]

@@ -46,14 +46,7 @@ _MOST_TO_END = 25.0
 _SECOND = 1_000_000_000
 _GAP = 20_000_000
 """Lateness from which on ticks are lost [ns]."""
-_SCENE = """\
-linkage: {linkage}
-rate: {rate}
-drive: {{constant_rate: {{rate: 6.0}}}}
-effects: {{velocity: {{}}}}
-record: {{directory: {folder}, name: bag, flush_period: 0.5, queue: {queue}}}
-"""
-_LINKAGE = Path(__file__).parents[2] / 'config' / 'linkages' / 'four_bar.yaml'
+_SCENE = 'drive={constant_rate: {rate: 6.0}}', 'effects={velocity: {}}'
 
 
 class Plan(NamedTuple):
@@ -106,19 +99,8 @@ def run(plan: Plan, *, frozen: bool) -> Stalled:
     """
     Run a node, and let its disk stall.
 
-    Parameters
-    ----------
-    plan
-        The plan of the run.
-    frozen
-        Whether to freeze a file system, which stalls calls in the kernel; otherwise `slow_node`
-        stalls its own calls.
-
-    Raises
-    ------
-    NotPermittedError
-        A file system cannot be mounted here.
-
+    A ``frozen`` file system stalls calls in the kernel; a NotPermittedError says that it cannot be
+    mounted here. Otherwise the node stalls its own calls, see `main`.
     """
     with TemporaryDirectory(prefix='linkage_ros_stall_') as name:
         if not frozen:
@@ -129,17 +111,18 @@ def run(plan: Plan, *, frozen: bool) -> Stalled:
 
 def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
     done = Stalled(plan)
-    scene = work / 'scene.yaml'
-    scene.write_text(
-        _SCENE.format(linkage=_LINKAGE, rate=plan.rate, folder=folder, queue=plan.queue)
-    )
     slowed_by = ('campaigns.reliability.stalling', str(file)) if file else ()
     log = work / f'{"stalling" if file else "linkage_node"}.log'
     try:
-        with recording_node(work, scene, folder / 'bag', plan.seconds + 60, *slowed_by) as (
-            _,
-            node,
-        ):
+        with recording_node(
+            work,
+            folder / 'bag',
+            plan.seconds + 60,
+            'four_bar',
+            [f'rate={plan.rate}', *_SCENE],
+            f'flush_period: 0.5, queue: {plan.queue}',
+            slowed_by,
+        ) as (_, node):
             sleep(0.5 * (plan.seconds - plan.stall))
             begin = time_ns()
             with _stalled(folder, file, plan):

@@ -259,22 +259,9 @@ def run_with(
     injection: Injection | None, folder: Path, do: Callable[[Watch], Recorded]
 ) -> tuple[Recorded | None, list[SeenCall]]:
     """
-    Run a recording and let calls fail.
+    Run a recording, watched by its argument, and let calls on the folder of its bag fail.
 
-    Parameters
-    ----------
-    injection
-        The fault to inject; None for none.
-    folder
-        The folder of the bag; calls on other files are allowed.
-    do
-        Records, watched by its argument.
-
-    Returns
-    -------
-    tuple
-        The result of the recording, None if it did not end, and all its calls on the bag.
-
+    Return its outcome, None if it did not end, and all its calls on the bag.
     """
 
     def recording(theirs: socket.socket) -> None:

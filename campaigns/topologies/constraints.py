@@ -70,14 +70,7 @@ class Equations:
     """
     The equations of a linkage.
 
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    vary
-        To vary its numbers: a function without arguments that returns the factors of one number,
-        one for each column of the states.
-
+    To ``vary`` its numbers, a function returns the factors of one number, a state each.
     """
 
     def __init__(self, linkage: Linkage, vary: Any = None) -> None:
@@ -118,19 +111,10 @@ class Equations:
 
     def residuals(self, unknowns: Array, inputs: Array) -> tuple[Array, Array, Array]:
         """
-        Return the residuals of the equations, their Jacobian, and the sizes of their terms.
+        Return the residuals of the equations, their Jacobian, and the moduli of their terms.
 
-        Parameters
-        ----------
-        unknowns
-            (n, N).
-        inputs
-            (inputs, N), in [rad] or [m].
-
-        Returns
-        -------
-        The residuals (n, N), the Jacobian (N, n, n), and the sums (n, N) of the terms' moduli.
-
+        At unknowns (n, N) and inputs (inputs, N), in [rad] or [m], these are (n, N), (N, n, n) and
+        sums (n, N).
         """
         count = unknowns.shape[1]
         rows: list[Array] = []

@@ -177,20 +177,10 @@ def parts(
     seed: int, wanted: dict[str, int], families: Iterable[str] = FAMILIES, slow: int = 4
 ) -> list[Part]:
     """
-    Return the work.
+    Return the work, for a number of linkages for each test.
 
-    Parameters
-    ----------
-    seed
-        The campaign's seed.
-    wanted
-        Number of linkages for each test: of each family for the kinematics, of all families
-        together for the other tests.
-    families
-        Names of the families.
-    slow
-        Factor by which fewer linkages of class III are tried, which are followed step by step.
-
+    For the kinematics that is the number of each family, for the other tests that of all together.
+    Linkages of class III are followed step by step; so fewer are tried, by the factor ``slow``.
     """
     weights = {family: 1 if family.startswith('class III') else slow for family in families}
     work = []

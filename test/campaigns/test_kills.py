@@ -14,11 +14,12 @@ from collections.abc import Callable
 from pathlib import Path
 import shutil
 
+from campaigns.campaign import results_of
 from campaigns.reliability import judge as judge_module
 from campaigns.reliability.judge import FAULT
 from campaigns.reliability.kills import (
     judge,
-    kill_all,
+    kill,
     Marks,
     NO_FILE,
     NO_FOLDER,
@@ -42,7 +43,7 @@ MS = 1_000_000
 
 @pytest.fixture(scope='module')
 def outcomes() -> list[Outcome]:
-    return list(kill_all(plans(SEED, KILLS, AIMED, (0.2, 1.2)), jobs=3))
+    return list(results_of(kill, plans(SEED, KILLS, AIMED, (0.2, 1.2)), 3))
 
 
 def test_a_killed_bag_begins_with_the_offered_messages(outcomes: list[Outcome]) -> None:
