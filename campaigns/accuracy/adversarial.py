@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from math import acos, cos, hypot, pi, radians, sin
 import random
 from typing import NamedTuple
@@ -180,22 +181,18 @@ def _crossed_slots(rng: random.Random, small: float) -> Mechanism:
     )
 
 
-def scaled(*exponents: int) -> Callable[[random.Random], Case]:
-    """Return a generator of linkages with lengths scaled by 10 to one of the exponents."""
-
-    def family(rng: random.Random) -> Case:
-        build = start(rng, rng.uniform(-pi, pi))
-        add_random(build, rng.choice(DYADS), CRANK, GROUND, first=True)
-        mechanism = build.mechanism()
-        scale = float(f'1e{rng.choice(exponents)}')
-        links = {
-            link: {point: (x * scale, y * scale) for point, (x, y) in points.items()}
-            for link, points in mechanism.links.items()
-        }
-        angles = [build.phi + rng.gauss(0.0, 0.3) for _ in range(ANGLES)]
-        return replace(mechanism, links=links), angles
-
-    return family
+def scaled(exponent: int, rng: random.Random) -> Case:
+    """Return a linkage with lengths scaled by 10 to the exponent or its negative."""
+    build = start(rng, rng.uniform(-pi, pi))
+    add_random(build, rng.choice(DYADS), CRANK, GROUND, first=True)
+    mechanism = build.mechanism()
+    scale = float(f'1e{rng.choice((-exponent, exponent))}')
+    links = {
+        link: {point: (x * scale, y * scale) for point, (x, y) in points.items()}
+        for link, points in mechanism.links.items()
+    }
+    angles = [build.phi + rng.gauss(0.0, 0.3) for _ in range(ANGLES)]
+    return replace(mechanism, links=links), angles
 
 
 def _two_dyads(rng: random.Random) -> tuple[Builder, list[str]]:
@@ -484,9 +481,9 @@ def slots_almost_parallel(rng: random.Random) -> Case:
     return loop, [rng.choice((0.0, pi, -pi)) + tiny(rng) for _ in range(ANGLES)]
 
 
-family('lengths × 1e±9', 'any threshold that is a length fails')(scaled(-9, 9))
+family('lengths × 1e±9', 'any threshold that is a length fails')(partial(scaled, 9))
 family('lengths × 1e±150', 'squares and products of lengths overflow or underflow')(
-    scaled(-150, 150)
+    partial(scaled, 150)
 )
 
 

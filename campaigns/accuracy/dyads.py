@@ -22,50 +22,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
-from campaigns.accuracy.mechanism import CRANK, Mechanism, Spot
+from campaigns.accuracy.mechanism import CRANK, Dyad, Mechanism, Spot
 from campaigns.accuracy.motion import decided, Motion, root
 from campaigns.series import Series
-from linkage_ros.kinematics import Side
-
-
-class _Dyad:
-    """A dyad; its class names the fields that say what it joins and what it passes on."""
-
-    __slots__ = ()
-
-    side: int  # Of dyads with two assemblies: +1 or -1
-    CLOSING: ClassVar[tuple[str, Side, Side] | None] = None  # The field, and its two sides
-    TURNED: ClassVar[tuple[str, ...]] = ()  # Links whose angles it computes
-    SLID: ClassVar[tuple[str, ...]] = ()  # Sliders that place a block
-    ENDS: ClassVar[tuple[str, str]] = ('a', 'd')  # What joins it to placed links
-
-    @property
-    def assembly(self) -> tuple[str, Side] | None:
-        if self.CLOSING is None:
-            return None
-        closing, ahead, behind = self.CLOSING
-        return getattr(self, closing), ahead if self.side > 0 else behind
-
-    @property
-    def turned(self) -> tuple[str, ...]:
-        return tuple(getattr(self, field) for field in self.TURNED)
-
-    @property
-    def slid(self) -> tuple[str, ...]:
-        return tuple(getattr(self, field) for field in self.SLID)
-
-    @property
-    def ends(self) -> tuple[Spot | str, ...]:
-        return tuple(getattr(self, field) for field in self.ENDS)
-
-    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
-        return tuple(end if isinstance(end, Spot) else mechanism.start(end) for end in self.ends)
 
 
 @dataclass(frozen=True, slots=True)
-class RPR(_Dyad):
+class RPR(Dyad):
     """Link ``rail`` from pin A, with a line that a block pinned at D slides on."""
 
     rail: str  # The link with the line
@@ -112,7 +77,7 @@ class RPR(_Dyad):
 
 
 @dataclass(frozen=True, slots=True)
-class RRP(_Dyad):
+class RRP(Dyad):
     """Link ``one`` from pin A to pin B, which a slider keeps on a line of a placed link."""
 
     one: str  # The link
@@ -150,7 +115,7 @@ class RRP(_Dyad):
 
 
 @dataclass(frozen=True, slots=True)
-class RRR(_Dyad):
+class RRR(Dyad):
     """Links ``one`` (from pin A) and ``two`` (from pin D), pinned together at B."""
 
     # The links that the dyad places.
@@ -209,7 +174,7 @@ class RRR(_Dyad):
 
 
 @dataclass(frozen=True, slots=True)
-class PRP(_Dyad):
+class PRP(Dyad):
     """Two blocks pinned together, each on a line of a placed link; the second may be virtual."""
 
     # Names of the sliders.
@@ -237,7 +202,7 @@ class PRP(_Dyad):
 
 
 @dataclass(frozen=True, slots=True)
-class RPP(_Dyad):
+class RPP(Dyad):
     """
     A yoke that slides on the line of a placed link; in its slot slides a block, pinned to a link.
 

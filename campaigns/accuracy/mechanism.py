@@ -19,7 +19,7 @@ from cmath import phase
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, sin
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 from linkage_ros.kinematics import (
     GROUND,
@@ -44,26 +44,50 @@ class Spot(NamedTuple):
     point: str
 
 
-class Dyad(Protocol):
-    """Two links, or a link and a virtual block, placed by one closed form."""
+class Dyad:
+    """
+    Two links, or a link and a virtual block, placed by one closed form.
+
+    Its class names the fields that say what it joins and what it passes on.
+    """
+
+    __slots__ = ()
+
+    side: int  # Of dyads with two assemblies: +1 or -1
+    CLOSING: ClassVar[tuple[str, Side, Side] | None] = None  # The field, and its two sides
+    TURNED: ClassVar[tuple[str, ...]] = ()  # Links whose angles it computes
+    SLID: ClassVar[tuple[str, ...]] = ()  # Sliders that place a block
+    ENDS: ClassVar[tuple[str, str]] = ('a', 'd')  # What joins it to placed links
 
     @property
-    def assembly(self) -> tuple[str, Side] | None: ...
+    def assembly(self) -> tuple[str, Side] | None:
+        if self.CLOSING is None:
+            return None
+        closing, ahead, behind = self.CLOSING
+        return getattr(self, closing), ahead if self.side > 0 else behind
 
     @property
-    def turned(self) -> tuple[str, ...]: ...
+    def turned(self) -> tuple[str, ...]:
+        return tuple(getattr(self, field) for field in self.TURNED)
 
     @property
-    def slid(self) -> tuple[str, ...]: ...
+    def slid(self) -> tuple[str, ...]:
+        return tuple(getattr(self, field) for field in self.SLID)
 
     @property
-    def ends(self) -> tuple[Spot | str, ...]: ...
+    def ends(self) -> tuple[Spot | str, ...]:
+        return tuple(getattr(self, field) for field in self.ENDS)
 
-    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]: ...
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
+        return tuple(end if isinstance(end, Spot) else mechanism.start(end) for end in self.ends)
 
-    def close(self, motion: Any) -> None: ...
+    def close(self, motion: Any) -> None:
+        """Place the links."""
+        raise NotImplementedError
 
-    def margin(self, motion: Any) -> Any: ...
+    def margin(self, motion: Any) -> Any:
+        """Return the distance to the toggle, or the sine of the angle between the lines."""
+        raise NotImplementedError
 
 
 Tie = Mapping[Key, float]

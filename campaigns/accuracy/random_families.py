@@ -17,8 +17,9 @@ the second) or arbitrary, as in linkage files.
 from __future__ import annotations
 
 from cmath import phase
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from math import pi
 import random
 
@@ -309,35 +310,30 @@ ANGLES = 50
 """Number of input angles of each linkage."""
 
 
-def _random_dyad(kind: str) -> Callable[[random.Random], Case]:
-    def family(rng: random.Random) -> Case:
-        build = start(rng, rng.uniform(-pi, pi))
-        add_random(build, kind, CRANK, GROUND, first=True)
-        return build.mechanism(), crank_angles(rng, build.phi)
-
-    return family
+def _random_dyad(kind: str, rng: random.Random) -> Case:
+    build = start(rng, rng.uniform(-pi, pi))
+    add_random(build, kind, CRANK, GROUND, first=True)
+    return build.mechanism(), crank_angles(rng, build.phi)
 
 
-def _chain(kinds: tuple[str, str, str] | None) -> Callable[[random.Random], Case]:
-    def family(rng: random.Random) -> Case:
-        build = start(rng, rng.uniform(-pi, pi))
-        latest, earlier = [CRANK], [GROUND]
-        for i in range(3):
-            kind = rng.choice(DYADS) if kinds is None else kinds[i]
-            known, other = rng.choice(latest), GROUND
-            if rng.random() < 0.3:
-                other = rng.choice(earlier)
-            links = add_random(build, kind, known, other, first=i == 0)
-            earlier, latest = [*earlier, *latest], links
-        return build.mechanism(), crank_angles(rng, build.phi)
-
-    return family
+def _chain(kinds: Sequence[str], rng: random.Random) -> Case:
+    """Return a chain of three dyads, each of one of some kinds."""
+    build = start(rng, rng.uniform(-pi, pi))
+    latest, earlier = [CRANK], [GROUND]
+    for i in range(3):
+        kind = rng.choice(kinds) if len(kinds) > 1 else kinds[0]
+        known, other = rng.choice(latest), GROUND
+        if rng.random() < 0.3:
+            other = rng.choice(earlier)
+        links = add_random(build, kind, known, other, first=i == 0)
+        earlier, latest = [*earlier, *latest], links
+    return build.mechanism(), crank_angles(rng, build.phi)
 
 
 RANDOM: dict[str, tuple[float, Callable[[random.Random], Case]]] = {
-    **{kind: (1.4, _random_dyad(kind)) for kind in DYADS},
-    'RRR-RRR-RRR': (1.0, _chain(('RRR', 'RRR', 'RRR'))),
-    'any three': (2.0, _chain(None)),
+    **{kind: (1.4, partial(_random_dyad, kind)) for kind in DYADS},
+    'RRR-RRR-RRR': (1.0, partial(_chain, ('RRR',))),
+    'any three': (2.0, partial(_chain, DYADS)),
 }
 """For each family its share of the cases, and the function that makes a linkage."""
 

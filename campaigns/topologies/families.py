@@ -20,9 +20,10 @@ from __future__ import annotations
 from cmath import phase
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from math import pi
 import random
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from campaigns.accuracy.dyads import RPR, RRP, RRR
 from campaigns.accuracy.mechanism import Spot
@@ -181,164 +182,103 @@ def _started(
     return replace(topology, start=(float(inputs[0, best]),), pose=pose)
 
 
-def _rrr(fold: bool, stretch: bool, place: str) -> Callable[[random.Random], Topology | None]:
-    def make(rng: random.Random) -> Topology | None:
-        parts = _Parts(rng, place)
-        a = _length(rng)
-        d = _other(rng, a)
-        if fold and stretch:
-            b, c = (d, a) if rng.random() < 0.6 else (a, d)
-        elif fold:
+def _rrr(parts: _Parts, fold: bool, stretch: bool) -> Topology | None:
+    rng = parts.rng
+    a = _length(rng)
+    d = _other(rng, a)
+    if fold and stretch:
+        b, c = (d, a) if rng.random() < 0.6 else (a, d)
+    elif fold:
+        b = _other(rng, a, d)
+        while (c := b + rng.choice((1, -1)) * (d - a)) <= 0.0 or {b, c} == {a, d}:
             b = _other(rng, a, d)
-            while (c := b + rng.choice((1, -1)) * (d - a)) <= 0.0 or {b, c} == {a, d}:
-                b = _other(rng, a, d)
-        else:
-            while (b := _other(rng, a, d)) >= a + d:
-                pass
-            c = a + d - b
-        parts.links['crank']['A'] = (a, 0.0)
-        line = parts.on_ground(d, 'D')
-        parts.links['one'] = {'A': (0.0, 0.0), 'B': (b, 0.0)}
-        parts.links['two'] = {'D': (0.0, 0.0), 'B': (c, 0.0)}
-        side = rng.choice((1, -1))
-        parts.groups.append(RRR('one', 'two', Spot('crank', 'A'), Spot(GROUND, 'D'), 'B', side))
-        parts.assembly['B'] = 'left' if side > 0 else 'right'
-        parts.sides['B'] = parts.passing(side, line, (fold, stretch))
-        return parts.topology(line, (fold, stretch))
-
-    return make
-
-
-def _rpr(
-    bent: bool, rail_on_crank: bool, place: str
-) -> Callable[[random.Random], Topology | None]:
-    def make(rng: random.Random) -> Topology | None:
-        parts = _Parts(rng, place)
-        a = _length(rng)
-        d = _other(rng, a) if bent else a
-        parts.links['crank']['A'] = (a, 0.0)
-        line = parts.on_ground(d, 'D')
-        pins = (Spot('crank', 'A'), Spot(GROUND, 'D'))
-        if not rail_on_crank:
-            pins = pins[::-1]
-        offset = rng.choice((1, -1)) * (d - a)
-        parts.links['rail'] = {pins[0].point: (0.0, 0.0)}
-        through, direction = pins[0].point, rng.choice((1.0, -1.0))
-        if bent:
-            through = 'Q'
-            parts.links['rail']['Q'] = (rng.choice((0.0, _length(rng))), offset)
-        block = ''
-        if rng.random() < 0.5:
-            block = 'block'
-            parts.links[block] = {pins[1].point: (0.0, 0.0)}
-        parts.sliders['S'] = Slider(pins[1].point, 'rail', through, (direction, 0.0), block, 0.0)
-        side = rng.choice((1, -1))
-        parts.groups.append(RPR('rail', pins[0], pins[1], 'S', side))
-        parts.assembly['S'] = 'ahead' if side > 0 else 'behind'
-        parts.sides['S'] = parts.passing(side, line, (True, False))
-        return parts.topology(line, (True, False))
-
-    return make
-
-
-def _rrp(
-    below: bool, above: bool, pin_on_crank: bool, place: str
-) -> Callable[[random.Random], Topology | None]:
-    def make(rng: random.Random) -> Topology | None:
-        parts = _Parts(rng, place)
-        a = _length(rng)
-        # The pivot lies by e left of the line; the rod is perpendicular where b = |e ± a|.
-        e = 0.0 if below and above else rng.choice((1, -1)) * _other(rng, a)
-        b = a
-        if not (below and above):
-            # y of the pin goes from e − a to e + a; the rod is perpendicular at y = b and y = −b.
-            b = a + e if below else a - e
-            while b <= 0.0 or b == a:
-                e = rng.choice((1, -1)) * _other(rng, a)
-                b = a + e if below else a - e
-        side = rng.choice((1, -1))
-        if pin_on_crank:
-            parts.links['crank']['A'] = (a, 0.0)
-            pin, along = Spot('crank', 'A'), GROUND
-            unit = rng.choice((1 + 0j, 1j, -1j))
-            foot = -1j * unit * e
-            parts.links[GROUND]['Q'] = (
-                parts.origin[0] + foot.real,
-                parts.origin[1] + foot.imag,
-            )
-            line, zero = -1j * unit, phase(unit) - 0.5 * pi
-            # ψ = φ − π/2: above (y = −b) at φ = 0, below (y = b) at φ = π.
-            at = (above, below)
-        else:
-            direction = parts.on_ground(a, 'A')
-            pin, along = Spot(GROUND, 'A'), 'crank'
-            unit = direction if direction.real else 1 + 0j
-            parts.links['crank']['Q'] = (0.0, -unit.real * e)
-            # The ground's pin seen from the crank's rail: ψ = dir(OA) − crank − dir(û).
-            line = -1j * direction * unit.conjugate()
-            zero = phase(direction * unit.conjugate()) - 0.5 * pi
-            # crank = dir(line) + φ: ψ = π/2 − φ: below at φ = 0, above at φ = π.
-            at = (below, above)
-        parts.links['rod'] = {pin.point: (0.0, 0.0), 'B': (b, 0.0)}
-        block = ''
-        if rng.random() < 0.5:
-            block = 'block'
-            parts.links[block] = {'B': (0.0, 0.0)}
-        parts.sliders['S'] = Slider('B', along, 'Q', (unit.real, unit.imag), block, 0.0)
-        parts.groups.append(RRP('rod', pin, 'B', 'S', side))
-        parts.assembly['S'] = 'ahead' if side > 0 else 'behind'
-        parts.sides['S'] = parts.passing(side, line, at, zero)
-        return parts.topology(line, at)
-
-    return make
-
-
-def _until_it_closes(
-    make: Callable[[random.Random], Topology | None],
-) -> Callable[[random.Random], Topology]:
-    def made(rng: random.Random) -> Topology:
-        while (topology := make(rng)) is None:
+    else:
+        while (b := _other(rng, a, d)) >= a + d:
             pass
-        return topology
-
-    return made
-
-
-def _families() -> dict[str, tuple[str, Callable[[random.Random], Topology]]]:
-    families: dict[str, tuple[str, Callable[[random.Random], Topology]]] = {}
-    for place, where in PLACES.items():
-        for name, fold, stretch in (
-            ('fold', True, False),
-            ('stretch', False, True),
-            ('fold and stretch', True, True),
-        ):
-            families[f'RRR {name}{place}'] = (
-                f'an RRR dyad {where} that is exactly in line: {name}',
-                _until_it_closes(_rrr(fold, stretch, place)),
-            )
-        for name, bent in (('bent', True), ('straight', False)):
-            for crank in (True, False):
-                carrier = 'the crank' if crank else 'the ground'
-                families[f'RPR {name}, rail on {carrier}{place}'] = (
-                    f'an RPR dyad {where} exactly in line, its rail {name} on {carrier}',
-                    _until_it_closes(_rpr(bent, crank, place)),
-                )
-        for name, below, above in (
-            ('below', True, False),
-            ('above', False, True),
-            ('below and above', True, True),
-        ):
-            for crank in (True, False):
-                carrier = 'the crank' if crank else 'the ground'
-                families[f'RRP {name}, pin on {carrier}{place}'] = (
-                    f'an RRP dyad {where}, pin on {carrier}, rod exactly perpendicular: {name}',
-                    _until_it_closes(_rrp(below, above, crank, place)),
-                )
-    return families
+        c = a + d - b
+    parts.links['crank']['A'] = (a, 0.0)
+    line = parts.on_ground(d, 'D')
+    parts.links['one'] = {'A': (0.0, 0.0), 'B': (b, 0.0)}
+    parts.links['two'] = {'D': (0.0, 0.0), 'B': (c, 0.0)}
+    side = rng.choice((1, -1))
+    parts.groups.append(RRR('one', 'two', Spot('crank', 'A'), Spot(GROUND, 'D'), 'B', side))
+    parts.assembly['B'] = 'left' if side > 0 else 'right'
+    parts.sides['B'] = parts.passing(side, line, (fold, stretch))
+    return parts.topology(line, (fold, stretch))
 
 
-CHANGE_POINTS = _families()
-"""For each family its description, and the function that makes a linkage."""
+def _rpr(parts: _Parts, bent: bool, rail_on_crank: bool) -> Topology | None:
+    rng = parts.rng
+    a = _length(rng)
+    d = _other(rng, a) if bent else a
+    parts.links['crank']['A'] = (a, 0.0)
+    line = parts.on_ground(d, 'D')
+    pins = (Spot('crank', 'A'), Spot(GROUND, 'D'))
+    if not rail_on_crank:
+        pins = pins[::-1]
+    offset = rng.choice((1, -1)) * (d - a)
+    parts.links['rail'] = {pins[0].point: (0.0, 0.0)}
+    through, direction = pins[0].point, rng.choice((1.0, -1.0))
+    if bent:
+        through = 'Q'
+        parts.links['rail']['Q'] = (rng.choice((0.0, _length(rng))), offset)
+    block = ''
+    if rng.random() < 0.5:
+        block = 'block'
+        parts.links[block] = {pins[1].point: (0.0, 0.0)}
+    parts.sliders['S'] = Slider(pins[1].point, 'rail', through, (direction, 0.0), block, 0.0)
+    side = rng.choice((1, -1))
+    parts.groups.append(RPR('rail', pins[0], pins[1], 'S', side))
+    parts.assembly['S'] = 'ahead' if side > 0 else 'behind'
+    parts.sides['S'] = parts.passing(side, line, (True, False))
+    return parts.topology(line, (True, False))
+
+
+def _rrp(parts: _Parts, below: bool, above: bool, pin_on_crank: bool) -> Topology | None:
+    rng = parts.rng
+    a = _length(rng)
+    # The pivot lies by e left of the line; the rod is perpendicular where b = |e ± a|.
+    e = 0.0 if below and above else rng.choice((1, -1)) * _other(rng, a)
+    b = a
+    if not (below and above):
+        # y of the pin goes from e − a to e + a; the rod is perpendicular at y = b and y = −b.
+        b = a + e if below else a - e
+        while b <= 0.0 or b == a:
+            e = rng.choice((1, -1)) * _other(rng, a)
+            b = a + e if below else a - e
+    side = rng.choice((1, -1))
+    if pin_on_crank:
+        parts.links['crank']['A'] = (a, 0.0)
+        pin, along = Spot('crank', 'A'), GROUND
+        unit = rng.choice((1 + 0j, 1j, -1j))
+        foot = -1j * unit * e
+        parts.links[GROUND]['Q'] = (
+            parts.origin[0] + foot.real,
+            parts.origin[1] + foot.imag,
+        )
+        line, zero = -1j * unit, phase(unit) - 0.5 * pi
+        # ψ = φ − π/2: above (y = −b) at φ = 0, below (y = b) at φ = π.
+        at = (above, below)
+    else:
+        direction = parts.on_ground(a, 'A')
+        pin, along = Spot(GROUND, 'A'), 'crank'
+        unit = direction if direction.real else 1 + 0j
+        parts.links['crank']['Q'] = (0.0, -unit.real * e)
+        # The ground's pin seen from the crank's rail: ψ = dir(OA) − crank − dir(û).
+        line = -1j * direction * unit.conjugate()
+        zero = phase(direction * unit.conjugate()) - 0.5 * pi
+        # crank = dir(line) + φ: ψ = π/2 − φ: below at φ = 0, above at φ = π.
+        at = (below, above)
+    parts.links['rod'] = {pin.point: (0.0, 0.0), 'B': (b, 0.0)}
+    block = ''
+    if rng.random() < 0.5:
+        block = 'block'
+        parts.links[block] = {'B': (0.0, 0.0)}
+    parts.sliders['S'] = Slider('B', along, 'Q', (unit.real, unit.imag), block, 0.0)
+    parts.groups.append(RRP('rod', pin, 'B', 'S', side))
+    parts.assembly['S'] = 'ahead' if side > 0 else 'behind'
+    parts.sides['S'] = parts.passing(side, line, at, zero)
+    return parts.topology(line, at)
 
 
 class Family(NamedTuple):
@@ -346,6 +286,44 @@ class Family(NamedTuple):
 
     description: str
     make: Callable[[random.Random], Topology]
+
+
+def _until_it_closes(shape: Shape, place: str, rng: random.Random) -> Topology:
+    while (topology := shape(_Parts(rng, place))) is None:
+        pass
+    return topology
+
+
+Shape = Callable[[_Parts], Topology | None]
+
+_CARRIERS = {'the crank': True, 'the ground': False}
+
+_SHAPES: dict[str, tuple[str, Shape]] = {
+    **{
+        f'RRR {name}': (
+            f'an RRR dyad {{}} that is exactly in line: {name}',
+            partial(_rrr, fold='fold' in name, stretch='stretch' in name),
+        )
+        for name in ('fold', 'stretch', 'fold and stretch')
+    },
+    **{
+        f'RPR {name}, rail on {carrier}': (
+            f'an RPR dyad {{}} exactly in line, its rail {name} on {carrier}',
+            partial(_rpr, bent=name == 'bent', rail_on_crank=crank),
+        )
+        for name in ('bent', 'straight')
+        for carrier, crank in _CARRIERS.items()
+    },
+    **{
+        f'RRP {name}, pin on {carrier}': (
+            f'an RRP dyad {{}}, pin on {carrier}, rod exactly perpendicular: {name}',
+            partial(_rrp, below='below' in name, above='above' in name, pin_on_crank=crank),
+        )
+        for name in ('below', 'above', 'below and above')
+        for carrier, crank in _CARRIERS.items()
+    },
+}
+"""Dyads with exact change points: what each is, with {} for its place, and what makes it."""
 
 
 ENDS = (
@@ -365,85 +343,85 @@ def _input(build: TopologyBuilder, on: str = GROUND) -> str:
     return build.sliding(on) if build.rng.random() < 0.35 else build.turning(on)
 
 
-def _on_links(kind: str, ends: tuple[str, str]) -> Callable[[random.Random], Topology]:
-    def make(rng: random.Random) -> Topology:
-        build = TopologyBuilder(rng)
-        links = {'ground': [GROUND], 'input': [_input(build)]}
-        if 'second input' in ends:
-            links['second input'] = [_input(build, rng.choice((GROUND, *links['input'])))]
-        if 'moving' in ends:
-            links['moving'] = build.dyad(rng.choice(DYADS), links['input'][0], GROUND)
-            if ends.count('moving') > 1 and rng.random() < 0.5:
-                links['moving'] += build.dyad(rng.choice(DYADS), links['input'][0], GROUND)
-        one = rng.choice(links[ends[0]])
-        other = rng.choice([link for link in links[ends[1]] if link != one] or [GROUND])
-        build.dyad(kind, one, other)
-        return build.topology()
-
-    return make
+def _on_links(kind: str, ends: tuple[str, str], rng: random.Random) -> Topology:
+    build = TopologyBuilder(rng)
+    links = {'ground': [GROUND], 'input': [_input(build)]}
+    if 'second input' in ends:
+        links['second input'] = [_input(build, rng.choice((GROUND, *links['input'])))]
+    if 'moving' in ends:
+        links['moving'] = build.dyad(rng.choice(DYADS), links['input'][0], GROUND)
+        if ends.count('moving') > 1 and rng.random() < 0.5:
+            links['moving'] += build.dyad(rng.choice(DYADS), links['input'][0], GROUND)
+    one = rng.choice(links[ends[0]])
+    other = rng.choice([link for link in links[ends[1]] if link != one] or [GROUND])
+    build.dyad(kind, one, other)
+    return build.topology()
 
 
-def _chain(count: int, inputs: int = 1) -> Callable[[random.Random], Topology]:
-    def make(rng: random.Random) -> Topology:
-        build = TopologyBuilder(rng)
-        known = [GROUND]
-        for _ in range(inputs):
-            known.append(_input(build, rng.choice(known)))
-        latest = known[1:]
-        for _ in range(count):
-            one = rng.choice(latest)
-            other = rng.choice([link for link in known if link != one])
-            kind = rng.choice(DYADS)
-            if rng.random() < 0.5:
-                one, other = other, one
-            latest = build.dyad(kind, one, other)
-            known += latest
-        return build.topology()
-
-    return make
+def _chain(count: int, inputs: int, rng: random.Random) -> Topology:
+    build = TopologyBuilder(rng)
+    known = [GROUND]
+    for _ in range(inputs):
+        known.append(_input(build, rng.choice(known)))
+    latest = known[1:]
+    for _ in range(count):
+        one = rng.choice(latest)
+        other = rng.choice([link for link in known if link != one])
+        kind = rng.choice(DYADS)
+        if rng.random() < 0.5:
+            one, other = other, one
+        latest = build.dyad(kind, one, other)
+        known += latest
+    return build.topology()
 
 
-def _between(inputs: int, chain: int) -> Callable[[random.Random], Topology]:
-    def make(rng: random.Random) -> Topology:
-        build = TopologyBuilder(rng)
-        known = [GROUND]
-        between = 1 if inputs == 1 else rng.choice((1, 2))
-        known += [_input(build) for _ in range(inputs - between)]
-        if len(known) < 2:
-            # Both ends of the arms are on the ground.
-            known += build.driven_dyad(GROUND, GROUND, between)
-        else:
-            known += build.driven_dyad(known[-1], GROUND, between)
-        for _ in range(chain):
-            one = rng.choice(known[1:])
-            other = rng.choice([link for link in known if link != one])
-            known += build.dyad(rng.choice(DYADS), one, other)
-        return build.topology()
-
-    return make
+def _between(inputs: int, chain: int, rng: random.Random) -> Topology:
+    build = TopologyBuilder(rng)
+    known = [GROUND]
+    between = 1 if inputs == 1 else rng.choice((1, 2))
+    known += [_input(build) for _ in range(inputs - between)]
+    if len(known) < 2:
+        # Both ends of the arms are on the ground.
+        known += build.driven_dyad(GROUND, GROUND, between)
+    else:
+        known += build.driven_dyad(known[-1], GROUND, between)
+    for _ in range(chain):
+        one = rng.choice(known[1:])
+        other = rng.choice([link for link in known if link != one])
+        known += build.dyad(rng.choice(DYADS), one, other)
+    return build.topology()
 
 
-def _class_3(
-    sliders: bool, chain: int = 0, inputs: int = 1
-) -> Callable[[random.Random], Topology]:
-    def make(rng: random.Random) -> Topology:
-        build = TopologyBuilder(rng)
-        known = [GROUND]
-        add = _input if sliders else TopologyBuilder.turning
-        known += [add(build, GROUND) for _ in range(inputs)]
-        latest = known[1:]
-        for _ in range(chain):
-            latest = build.dyad(rng.choice(DYADS), known[1], GROUND)
-            known += latest
-        legs = [rng.choice(('RR', 'PR', 'RP')) for _ in range(3)] if sliders else ['RR'] * 3
-        if sliders and legs.count('RR') == 0:
-            legs[0] = 'RR'
-        held = [rng.choice(latest), *(GROUND if inputs < 2 else known[-1],), GROUND]
-        build.platform(held, legs)
-        return build.topology()
+def _class_3(sliders: bool, chain: int, inputs: int, rng: random.Random) -> Topology:
+    build = TopologyBuilder(rng)
+    known = [GROUND]
+    add = _input if sliders else TopologyBuilder.turning
+    known += [add(build, GROUND) for _ in range(inputs)]
+    latest = known[1:]
+    for _ in range(chain):
+        latest = build.dyad(rng.choice(DYADS), known[1], GROUND)
+        known += latest
+    legs = [rng.choice(('RR', 'PR', 'RP')) for _ in range(3)] if sliders else ['RR'] * 3
+    if sliders and legs.count('RR') == 0:
+        legs[0] = 'RR'
+    held = [rng.choice(latest), *(GROUND if inputs < 2 else known[-1],), GROUND]
+    build.platform(held, legs)
+    return build.topology()
 
-    return make
 
+_OTHERS: dict[str, tuple[Any, ...]] = {
+    # The description, and what makes a linkage, with its arguments.
+    'two inputs': ('two inputs that turn or slide, and two dyads', _chain, 2, 2),
+    'three inputs': ('three inputs that turn or slide, and two dyads', _chain, 2, 3),
+    'cylinder': ('an input between moving links, both ends on the ground', _between, 1, 0),
+    'cylinder and chain': ('an input between moving links, and two dyads', _between, 1, 2),
+    'cylinder and crank': ('inputs on the ground and between moving links', _between, 2, 1),
+    'three, two between': ('three inputs, one or two between moving links', _between, 3, 1),
+    'class III': ('a platform on three legs, one on a crank', _class_3, False, 0, 1),
+    'class III sliders': ('a platform whose legs are links, slots or rails', _class_3, True, 0, 1),
+    'class III chain': ('a platform with a leg on a dyad', _class_3, True, 1, 1),
+    'class III two inputs': ('a platform on two inputs and the ground', _class_3, True, 0, 2),
+}
 
 FAMILIES: dict[str, Family] = {
     **{
@@ -451,28 +429,23 @@ FAMILIES: dict[str, Family] = {
             f'a random {kind} dyad; first end on the {one} link, second on the {other} link'
             if kind != 'PRP'
             else f'a pin on a line of the {one} link and on one of the {other} link',
-            _on_links(kind, (one, other)),
+            partial(_on_links, kind, (one, other)),
         )
         for kind in DYADS
         for one, other in ENDS
     },
     **{
         f'chain of {count}': Family(
-            f'{count} random dyads, each on links before it', _chain(count)
+            f'{count} random dyads, each on links before it', partial(_chain, count, 1)
         )
         for count in (2, 3, 4)
     },
-    'two inputs': Family('two inputs that turn or slide, and two dyads', _chain(2, 2)),
-    'three inputs': Family('three inputs that turn or slide, and two dyads', _chain(2, 3)),
-    'cylinder': Family('an input between moving links, both ends on the ground', _between(1, 0)),
-    'cylinder and chain': Family('an input between moving links, and two dyads', _between(1, 2)),
-    'cylinder and crank': Family('inputs on the ground and between moving links', _between(2, 1)),
-    'three, two between': Family('three inputs, one or two between moving links', _between(3, 1)),
-    'class III': Family('a platform on three legs, one on a crank', _class_3(False)),
-    'class III sliders': Family('a platform whose legs are links, slots or rails', _class_3(True)),
-    'class III chain': Family('a platform with a leg on a dyad', _class_3(True, 1)),
-    'class III two inputs': Family(
-        'a platform on two inputs and the ground', _class_3(True, 0, 2)
-    ),
-    **{name: Family(*family) for name, family in CHANGE_POINTS.items()},
+    **{
+        name: Family(text, partial(make, *given)) for name, (text, make, *given) in _OTHERS.items()
+    },
+    **{
+        f'{name}{place}': Family(text.format(where), partial(_until_it_closes, shape, place))
+        for place, where in PLACES.items()
+        for name, (text, shape) in _SHAPES.items()
+    },
 }

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from math import tau
 import random
-from typing import Any
+from typing import Any, NamedTuple
 
 from campaigns.tally import Judgement, QUANTITIES
 from campaigns.topologies.constraints import (
@@ -52,6 +52,14 @@ _STILL = 2.0**-10
 """Least κ of a joint, relative to the greatest κ of the state."""
 
 CLOSED, OPEN, AT_LIMIT, UNKNOWN = 'closed', 'open', 'at limit', 'unknown'
+
+
+class States(NamedTuple):
+    """Inputs with their rates and accelerations, (inputs, N) each."""
+
+    inputs: Array
+    rates: Array
+    accelerations: Array
 
 
 class Truth:
@@ -107,16 +115,16 @@ def judge_states(
     walks: Walks | None,
 ) -> None:
     """Compare positions, rates, accelerations and statuses at random states."""
-    count = len(topology.start)
-    inputs = np.array([_values(topology, rng, i) for i in range(count)], Real)
-    rates = np.array([[rng.gauss(0.0, 1.0) for _ in range(STATES)] for _ in range(count)], Real)
-    accelerations = np.array(
-        [[rng.gauss(0.0, 1.0) for _ in range(STATES)] for _ in range(count)], Real
+    inputs = np.array([_values(topology, rng, i) for i in range(len(topology.start))], Real)
+    rates, accelerations = (
+        np.array([[rng.gauss(0.0, 1.0) for _ in range(STATES)] for _ in inputs], Real)
+        for _ in range(2)
     )
+    states = States(inputs, rates, accelerations)
     truth = Truth(topology, inputs, walks)
-    answers = _scalar_answers(closure, inputs, rates, accelerations, findings)
-    _compare_arrays(closure, inputs, rates, accelerations, answers, truth, findings)
-    _compare(topology, closure, truth, answers, (rates, accelerations), findings)
+    answers = _scalar_answers(closure, states, findings)
+    _compare_arrays(closure, states, answers, truth, findings)
+    _compare(topology, closure, truth, answers, states, findings)
     for at in topology.change_points:
         _judge_change_point(topology, closure, at, findings)
 
@@ -147,12 +155,12 @@ def _values(topology: Topology, rng: random.Random, number: int) -> list[float]:
 
 
 def _scalar_answers(
-    closure: Closure, inputs: Array, rates: Array, accelerations: Array, findings: Judgement
+    closure: Closure, states: States, findings: Judgement
 ) -> list[tuple[Any, tuple[tuple[float, ...], ...]] | None]:
     """Return the position and joints with their derivatives; None for an exception."""
     answers: list[tuple[Any, tuple[tuple[float, ...], ...]] | None] = []
-    for k in range(inputs.shape[1]):
-        x, v, a = ([float(value) for value in row[:, k]] for row in (inputs, rates, accelerations))
+    for k in range(STATES):
+        x, v, a = ([float(value) for value in row[:, k]] for row in states)
         call = 'position'
         try:
             position = closure.position(*x)
@@ -172,25 +180,16 @@ def _scalar_answers(
 
 
 def _compare_arrays(
-    closure: Closure,
-    inputs: Array,
-    rates: Array,
-    accelerations: Array,
-    answers: list[Any],
-    truth: Truth,
-    findings: Judgement,
+    closure: Closure, states: States, answers: list[Any], truth: Truth, findings: Judgement
 ) -> None:
     """Compare the solution of arrays with that of single states."""
     from linkage_ros.kinematics import CODES  # local import: with numpy only
 
-    given = rates.astype(float), accelerations.astype(float)
+    inputs, rates, accelerations = (values.astype(float) for values in states)
     try:
         for derivatives in (0, 1, 2):
             batch = closure.solve(
-                *inputs.astype(float),
-                rates=given[0],
-                accelerations=given[1],
-                derivatives=derivatives,
+                *inputs, rates=rates, accelerations=accelerations, derivatives=derivatives
             )
     except Exception as error:  # noqa: BLE001 - any exception is counted
         findings.find('traceback: solve', f'derivatives={derivatives}: {error!r}')
@@ -217,7 +216,7 @@ def _compare(
     closure: Closure,
     truth: Truth,
     answers: list[Any],
-    motion_of_inputs: tuple[Array, Array],
+    states: States,
     findings: Judgement,
 ) -> None:
     closed = []
@@ -240,8 +239,7 @@ def _compare(
         closed.append(k)
     if not closed:
         return
-    rates, accelerations = (values[:, closed] for values in motion_of_inputs)
-    inputs = truth.inputs[:, closed]
+    inputs, rates, accelerations = (values[:, closed] for values in states)
     motion = truth.equations.motion(truth.unknowns[:, closed], inputs, rates, accelerations)
     kappa = condition_numbers(topology.linkage, motion, inputs, rates, accelerations, 1)
     for column, k in enumerate(closed):
