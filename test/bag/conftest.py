@@ -9,9 +9,7 @@
 """Fixtures of the tests of bags: joint states by rosbags, and the readers of mcap and rosbags."""
 
 from collections.abc import Iterator
-import os
 from pathlib import Path
-import subprocess
 from typing import Any, NamedTuple
 
 from linkage_ros.bag import QosProfile, Topic
@@ -20,6 +18,8 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
+
+from ..support import disks
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 TYPE = 'sensor_msgs/msg/JointState'
@@ -119,13 +119,6 @@ def readers():
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """Mount a disk of 2 MiB, where that is allowed."""
-    folder = tmp_path / 'disk'
-    folder.mkdir()
-    if os.geteuid() != 0:
-        pytest.skip('only root can mount a small disk')
-    mount = ['mount', '-t', 'tmpfs', '-o', 'size=2m', 'tmpfs', str(folder)]
-    if subprocess.run(mount, capture_output=True, check=False).returncode:
-        pytest.skip('this root may not mount a small disk')
-    yield folder
-    subprocess.run(['umount', '--lazy', str(folder)], check=True)
+    """Return a disk of 2 MiB, where it can be mounted."""
+    with disks.small_disk(tmp_path, 2) as folder:
+        yield folder

@@ -10,10 +10,8 @@
 
 from collections import Counter
 import json
-import os
 import re
 import resource
-import subprocess
 import time
 
 from linkage_ros.cli.main import main
@@ -23,6 +21,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from .graph import crank, wait_for
+from ..support import disks
 
 REAL_STARTS = True
 
@@ -33,15 +32,10 @@ INCOMPLETE = 1
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """Mount a disk of 4 MiB, of which 3 are taken, where that is allowed."""
-    folder = tmp_path / 'disk'
-    folder.mkdir()
-    mount = ['mount', '-t', 'tmpfs', '-o', 'size=4m', 'tmpfs', str(folder)]
-    if os.geteuid() or subprocess.run(mount, capture_output=True, check=False).returncode:
-        pytest.skip('only a root that may mount can make a small disk')
-    (folder / 'other').write_bytes(bytes(3 * 2**20))
-    yield folder
-    subprocess.run(['umount', '--lazy', str(folder)], check=True)
+    """Return a disk of 4 MiB, of which 3 are taken, where it can be mounted."""
+    with disks.small_disk(tmp_path, 4) as folder:
+        (folder / 'other').write_bytes(bytes(3 * 2**20))
+        yield folder
 
 
 @pytest.fixture

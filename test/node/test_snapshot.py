@@ -31,6 +31,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from .graph import crank, NS, wait_for
+from ..support import disks
 from ..support.commands import linkage
 
 REAL_STARTS = True
@@ -201,14 +202,9 @@ def test_run_prints_counts_of_the_snapshot_memory(tmp_path, domain, write_scene)
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """Mount a disk of 1 MiB, where that is allowed."""
-    folder = tmp_path / 'disk'
-    folder.mkdir()
-    mount = ['mount', '-t', 'tmpfs', '-o', 'size=1m', 'tmpfs', str(folder)]
-    if os.geteuid() or subprocess.run(mount, capture_output=True, check=False).returncode:
-        pytest.skip('only a root that may mount can make a small disk')
-    yield folder
-    subprocess.run(['umount', '--lazy', str(folder)], check=True)
+    """Return a disk of 1 MiB, where it can be mounted."""
+    with disks.small_disk(tmp_path, 1) as folder:
+        yield folder
 
 
 def test_snapshot_succeeds_after_the_disk_has_room_again(
