@@ -9,14 +9,14 @@
 Errors of spatial linkages, step by step and as a whole.
 
 Random steps, far from toggles and down to 1e-9 from one, and whole linkages are compared with
-closed forms of more than 50 digits.
+closed forms of more than 50 digits, in power series of `campaigns.series`.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, partial
 from math import atan2, cos, dist, hypot, pi, remainder, sin, sqrt, tau
 from random import Random
@@ -24,11 +24,11 @@ from typing import Any, NamedTuple
 
 from bench import ROOT
 from bench.report import Table
-from campaigns import space_reference as exact
 from campaigns.accuracy.run import accuracy_table, LIMIT, worst_table
 from campaigns.campaign import Findings, Page, Part, parts_of, tallies_of
-from campaigns.series import Row, Series, Tape
+from campaigns.series import CORRECT, ORDER, Row, Series, Tape, UNIT_ROUNDOFF
 from campaigns.tally import Judgement, QUANTITIES
+from flint import arb
 from linkage_ros.description import load
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint, Status
@@ -53,6 +53,139 @@ reference has more than fifty digits; rates and accelerations are coefficients o
 time. *near*: 1e-9 to 1e-3 from a toggle. The limit is 4.
 """,
 )
+
+
+def errors_of(
+    result: Series,
+    found: Sequence[float],
+    floor: float | None = None,
+    passed: Sequence[Series] = (),
+) -> list[float]:
+    """
+    Return the errors of a value, its rate and its acceleration at the time 0, in u·κ.
+
+    With a ``floor`` the value is an angle modulo 2π, which counts as the floor at least.
+    ``passed`` are the coordinates of a point that a step passes to the next one. Its place,
+    velocity and acceleration are rounded, so each counts with its own κ.
+    """
+    given = result.tape.widths
+    kappa = result.sizes(given | {part.index: part.sizes(given) for part in passed})
+    off = [arb(one) - order for one, order in zip(found, result.orders(), strict=True)]
+    if floor is not None:
+        kappa[0] += max(floor - abs(float(result.value[0])), 0.0)
+        off[0] -= 2 * round(float(off[0]) / (2 * pi)) * arb.pi()
+    errors = []
+    for error, size in zip(off, kappa, strict=True):
+        assert float(error.rad()) <= CORRECT * size, 'fewer than fifty digits are proven'
+        errors.append(abs(float(error)) / (UNIT_ROUNDOFF * size) if error != 0 else 0.0)
+    return errors
+
+
+def dot(one: Row, other: Row) -> Series:
+    """Return the scalar product."""
+    pairs = [*zip(one, other, strict=True)]
+    first, *more = (a.value * b.value for a, b in pairs)
+    sources = [part for a, b in pairs for part in ((a, b.value), (b, a.value))]
+    return Series(one[0].tape, sum(more, first), *sources)
+
+
+def cross(one: Row, other: Row) -> Row:
+    """Return the cross product."""
+    (a, b, c), (d, e, f) = one, other
+    return [b * f - c * e, c * d - a * f, a * e - b * d]
+
+
+def less(one: Row, other: Row) -> Row:
+    """Return the difference."""
+    return [a - b for a, b in zip(one, other, strict=True)]
+
+
+def unit(vector: Row) -> Row:
+    """Return the direction of a vector."""
+    size = dot(vector, vector).sqrt()
+    return [part / size for part in vector]
+
+
+def angle_of(x: Series, y: Series) -> Series:
+    """Return the angle of a vector in a plane, by integration of its rate."""
+    a, b = x.value, y.value
+    over = (a * a + b * b).inv()
+    turn = (a * b.derivative() - b * a.derivative()) * over
+    value = turn.integral() + arb.atan2(b[0], a[0])
+    return Series(x.tape, value, (x, -b * over), (y, a * over))
+
+
+def hinge_angle(place: Row, to: Row, rod: Series, sign: int) -> Series:
+    """Return the angle about z that brings a place to a distance from a point."""
+    (a, b, h), (x, y, z) = place, to
+    rest = h - z
+    r, d = dot([a, b], [a, b]), dot([x, y], [x, y])
+    even = r + d + (rest * rest - rod * rod)
+    turn = angle_of(even, ((r * d) * 4.0 - even * even).sqrt())
+    return angle_of(x, y) - angle_of(a, b) + turn * sign
+
+
+def slide_length(place: Row, to: Row, rod: Series, sign: int) -> Series:
+    """Return the slide along z that brings a place to a distance from a point."""
+    x, y, z = less(to, place)
+    return z + (rod * rod - dot([x, y], [x, y])).sqrt() * sign
+
+
+def three_spheres(ends: Sequence[Row], rods: Row, sign: int) -> Row:
+    """Return the point of three spheres: on the line of two planes, by a quadratic equation."""
+    start, one, other = ends
+    d, e = less(one, start), less(other, start)
+    normal = cross(d, e)
+    # (X − P0)·d = (l0² − l1² + |d|²)/2, likewise e.
+    first = rods[0] * rods[0]
+    sides = [
+        (first - rod * rod + dot(edge, edge)) * 0.5 for rod, edge in ((rods[1], d), (rods[2], e))
+    ]
+    square = dot(normal, normal)
+    ways = zip(cross(e, normal), cross(normal, d), strict=True)
+    foot = [dot(sides, [*pair]) / square for pair in ways]
+    height = ((first - dot(foot, foot)) / square).sqrt() * sign
+    return [s + f + height * n for s, f, n in zip(start, foot, normal, strict=True)]
+
+
+def turned_about(point: Row, at: Row, axis: Row, angle: Series) -> Row:
+    """Return a point turned about an axis of any length that passes a place (Rodrigues)."""
+    arm, way = less(point, at), unit(axis)
+    c, s = angle.cos_sin()
+    along = dot(way, arm)
+    parts = zip(at, arm, cross(way, arm), way, strict=True)
+    weights = [c, s, along - c * along]
+    return [a + dot(weights, [*rest]) for a, *rest in parts]
+
+
+def angle_to_meet(point: Row, at: Row, axis: Row, to: Row, rod: Series, sign: int) -> Series:
+    """Return the angle about an axis that brings a point to a distance from another one."""
+    z, arm = unit(axis), less(point, at)
+    along = dot(arm, z)
+    x = unit([a - along * part for a, part in zip(arm, z, strict=True)])
+    frame = (x, cross(z, x), z)
+    place, beside = ([dot(way, each) for way in frame] for each in (arm, less(to, at)))
+    return hinge_angle(place, beside, rod, sign)
+
+
+def root_near(orders: Sequence[Sequence[float]], gaps: Callable[[Row], Iterable[Series]]) -> Row:
+    """Return two unknowns whose two gaps are 0, by Newton's method from found orders."""
+    values = [Tape().number(*each).value for each in orders]
+    while True:
+        tape = Tape()
+        unknowns = [Series(tape, value) for value in values]
+        left = [*gaps(unknowns)]
+        (a, b), (c, d) = ([gap.slopes()[one.index] for one in unknowns] for gap in left)
+        over = (b * c - a * d).inv()
+        rows = (d * over, -b * over), (-c * over, a * over)
+        steps = [p * left[0].value + q * left[1].value for p, q in rows]
+        values = [value + step for value, step in zip(values, steps, strict=True)]
+        # The next step would be about the square of this one.
+        if max(abs(float(step[k])) for step in steps for k in range(ORDER)) < 2.0**-90:
+            return [
+                Series(tape, value, *zip(left, row, strict=True))
+                for value, row in zip(values, rows, strict=True)
+            ]
 
 
 class Case(NamedTuple):
@@ -99,7 +232,7 @@ def hinge_case(random: Random, near: bool = False) -> Case:
     direction = atan2(place[1], place[0])
     pair = HingePair(0, GROUND_FRAME)
     step = ClosedHinge(pair, place, 1, Rod(rod), float(sign), 2, r, direction)
-    return _joint_case(step, motion, exact.hinge_angle, floor=0.0)
+    return _joint_case(step, motion, hinge_angle, floor=0.0)
 
 
 def slide_case(random: Random, near: bool = False) -> Case:
@@ -108,7 +241,7 @@ def slide_case(random: Random, near: bool = False) -> Case:
     to, sign = motion[0], random.choice((-1, 1))
     rod = hypot(to[0] - place[0], to[1] - place[1]) * (1.0 + _distance(random, near))
     step = ClosedSlide(SlidePair(0, GROUND_FRAME), place, 1, Rod(rod), float(sign), 2)
-    return _joint_case(step, motion, exact.slide_length)
+    return _joint_case(step, motion, slide_length)
 
 
 def _joint_case(
@@ -117,7 +250,7 @@ def _joint_case(
     found = [one.coordinates[1] for one in _states_after(step, *([part] for part in motion))]
     tape = Tape()
     value = solve(tape.row(step.place), tape.row(*motion), tape.number(step.rod[0]), step.sign)
-    return Case(exact.errors_of(value, found, floor), (step, motion))
+    return Case(errors_of(value, found, floor), (step, motion))
 
 
 def three_distances_case(random: Random, near: bool = False) -> Case:
@@ -136,9 +269,9 @@ def three_distances_case(random: Random, near: bool = False) -> Case:
     step = ThreeDistances(tuple(end + 1 for end in order), lengths, float(side), 4)
     axis, tape = random.randrange(3), Tape()
     given = [tape.row(*each) for each in zip(*motion, strict=True)]
-    point = exact.three_spheres(given, tape.row(rods), sign)
+    point = three_spheres(given, tape.row(rods), sign)
     found = [state.pins[4][axis] for state in _states_after(step, *motion)]
-    return Case(exact.errors_of(point[axis], found), (step, axis, motion))
+    return Case(errors_of(point[axis], found), (step, axis, motion))
 
 
 def rssr_case(random: Random) -> Case:
@@ -160,7 +293,7 @@ def rssr_case(random: Random) -> Case:
             break
     tape = Tape()
     axis = _axis_on(tape, linkage, 'crank')
-    pin = exact.turned_about(tape.row(linkage.points['A']), *axis, tape.number(*state))
+    pin = turned_about(tape.row(linkage.points['A']), *axis, tape.number(*state))
     (found,) = joint_orders(closure, *([number] for number in state))
     return Case(_held_errors(tape, closure, ('rocker', 'B', 'A'), pin, found), (linkage, state))
 
@@ -180,10 +313,10 @@ def _held_errors(
     rod, axis = tape.distance(places[point], places[other]), _axis_on(tape, closure.linkage, hinge)
     place, drawn = tape.row(places[point]), tape.row(places[other])
     # In the pose the hinge is 0: this tells the assembly.
-    sides = {sign: exact.angle_to_meet(place, *axis, drawn, rod, sign) for sign in (1, -1)}
+    sides = {sign: angle_to_meet(place, *axis, drawn, rod, sign) for sign in (1, -1)}
     sign = min(sides, key=lambda sign: abs(remainder(float(sides[sign].value[0]), tau)))
-    angle = exact.angle_to_meet(place, *axis, pin, rod, sign)
-    return exact.errors_of(angle, found, pi, pin)
+    angle = angle_to_meet(place, *axis, pin, rod, sign)
+    return errors_of(angle, found, pi, pin)
 
 
 _ANKLE = (('m1', 'b1', 'c1'), ('m2', 'b2', 'c2'))
@@ -207,8 +340,8 @@ def _feet(tape: Tape, linkage: SpaceLinkage, pitch: Series, roll: Series) -> lis
     """Return where the rods hold the foot."""
     first, second = (_axis_on(tape, linkage, name) for name in ('pitch', 'roll'))
     points = [tape.row(linkage.points[point]) for *_, point in _ANKLE]
-    rolled = (exact.turned_about(point, *second, roll) for point in points)
-    return [exact.turned_about(point, *first, pitch) for point in rolled]
+    rolled = (turned_about(point, *second, roll) for point in points)
+    return [turned_about(point, *first, pitch) for point in rolled]
 
 
 def ankle_case(random: Random) -> Case:
@@ -232,12 +365,12 @@ def ankle_motors_case(random: Random) -> Case:
             _ANKLE, _feet(tape, linkage, *joints), zip(*states, strict=True), strict=True
         ):
             axis, angle = _axis_on(tape, linkage, motor), tape.number(*motion)
-            arm = exact.less(pin, exact.turned_about(tape.row(linkage.points[bar]), *axis, angle))
+            arm = less(pin, turned_about(tape.row(linkage.points[bar]), *axis, angle))
             rod = tape.distance(linkage.points[bar], linkage.points[foot])
-            yield exact.dot(arm, arm) - rod * rod
+            yield dot(arm, arm) - rod * rod
 
-    pairs = zip(exact.root_near(found, gaps), found, strict=True)
-    return Case([*map(max, *(exact.errors_of(*pair, floor=pi) for pair in pairs))], states)
+    pairs = zip(root_near(found, gaps), found, strict=True)
+    return Case([*map(max, *(errors_of(*pair, floor=pi) for pair in pairs))], states)
 
 
 def joint_orders(

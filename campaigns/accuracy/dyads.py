@@ -66,7 +66,6 @@ class RPR(Dyad):
             motion.place(block, motion.unit[self.rail] * twist, self.d.point, end)
 
     def margin(self, motion: Motion) -> Series:
-        """Return the distance to the toggle, in the constants' unit; negative if open."""
         diagonal = motion.at(self.d) - motion.at(self.a)
         base = (
             _pin_at_zero(motion, self.slider, self.a.point, self.d.point)
@@ -107,7 +106,6 @@ class RRP(Dyad):
             motion.ride(self.slider, block, self.pin, start + arm)
 
     def margin(self, motion: Motion) -> Series:
-        """Return the distance to the toggle, in the constants' unit; negative if open."""
         base, line, _ = motion.line(self.slider, self.pin)
         across = ((base - motion.at(self.a)) * line.conjugate()).imag()
         reach = motion.vector(self.one, self.a.point, self.pin).norm().sqrt()
@@ -163,7 +161,6 @@ class RRR(Dyad):
         return side
 
     def margin(self, motion: Motion) -> Series:
-        """Return the distance to the toggle, in the constants' unit; negative if open."""
         diagonal = motion.at(self.d) - motion.at(self.a)
         s = diagonal.norm().sqrt()
         b = motion.vector(self.one, self.a.point, self.pin).norm().sqrt()
@@ -196,7 +193,6 @@ class PRP(Dyad):
                 motion.ride(name, block, self.pin, where)
 
     def margin(self, motion: Motion) -> Series:
-        """Return the sine of the angle between the lines."""
         lines = [motion.line(name, self.pin)[1] for name in (self.one, self.two)]
         return _positive((lines[0] * lines[1].conjugate()).imag())
 
@@ -239,7 +235,6 @@ class RPP(Dyad):
             motion.place(inner.block, turned, self.a.point, start)
 
     def margin(self, motion: Motion) -> Series:
-        """Return the sine of the angle between the lines."""
         outer = motion.mechanism.sliders[self.outer]
         _, line, unit = motion.line(self.outer, outer.point)
         assert unit is not None

@@ -86,7 +86,11 @@ class Dyad:
         raise NotImplementedError
 
     def margin(self, motion: Any) -> Any:
-        """Return the distance to the toggle, or the sine of the angle between the lines."""
+        """
+        Return the distance to the toggle, in the constants' unit, negative if open.
+
+        Of two sliders it is the sine of the angle between the lines.
+        """
         raise NotImplementedError
 
 

@@ -24,7 +24,6 @@ from collections.abc import Iterator, Mapping
 from importlib import metadata
 from math import ceil
 from pathlib import Path
-from pprint import pprint
 import random
 from typing import Any
 
@@ -38,6 +37,7 @@ from campaigns.accuracy.reference import condition_numbers, margins, Reference
 from campaigns.campaign import Findings, Page, Part, parts_of, show_results, tallies_of
 from campaigns.series import FACTORIALS, UNIT_ROUNDOFF
 from campaigns.tally import edges, Judgement, OCTAVE, QUANTITIES, Tally
+from linkage_ros.description import linkage_text
 from linkage_ros.kinematics import Closure, SlideJoint
 import numpy as np
 
@@ -259,7 +259,8 @@ def show(options: argparse.Namespace) -> None:
     family, place = options.show
     index, _, case = place.partition(':')
     mechanism, phi, alpha = make(options.seed, family, int(index))
-    pprint(mechanism)
+    print(linkage_text(mechanism.linkage(), [f'{family} {index}, seed {options.seed}']))
+    print(*mechanism.dyads, sep='\n')
     show_results(judge(mechanism, phi, alpha))
     if case:
         _show_case(Reference(mechanism), phi[int(case)], alpha[int(case)])

@@ -11,8 +11,7 @@ from math import hypot
 from random import Random
 
 from campaigns.series import Tape
-from campaigns.space import draw_case, FAMILIES, LIMIT, SLOWER
-from campaigns.space_reference import errors_of
+from campaigns.space import draw_case, errors_of, FAMILIES, LIMIT, SLOWER
 from campaigns.tally import QUANTITIES
 from linkage_ros.kinematics import Status
 from linkage_ros.kinematics.space.joints import HingePair, SlidePair
