@@ -31,8 +31,9 @@ from linkage_ros.kinematics.space.vectors import (
     Vector,
 )
 
-_SAME = 0.5e-6
-"""Points of one link nearer to each other than this are one; no others are, after `merge_pose`."""
+SAME = 0.5e-6
+"""Points of one link nearer to each other than this are one; no others are, after `merge_pose`,
+and a point as near to the axis of a hinge of its links lies on it."""
 
 
 class CarriedPoints:
@@ -108,7 +109,7 @@ class CarriedPoints:
             found = False
             for points in self.carried.values():
                 for one, other in combinations(points, 2):
-                    if dist(self.places[one], self.places[other]) < _SAME:
+                    if dist(self.places[one], self.places[other]) < SAME:
                         self._make_same(one, other)
                         found = True
                         break

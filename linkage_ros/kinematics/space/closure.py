@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import pairwise, permutations
+from itertools import chain, pairwise, permutations
 from math import atan2, dist, sqrt, tau
 from typing import TYPE_CHECKING
 
@@ -56,7 +56,7 @@ _MET = 1e-4
 """Largest gap of a redundant equation, relative to the size: CAD rounds."""
 
 _BESIDE = 0.01
-"""How far beside a change point the degrees of freedom are judged, in [rad] or [m]."""
+"""How far beside a pose a linkage is judged, in [rad] or [m]."""
 
 _STATES = 64
 """Number of states over the inputs in which redundant equations are checked."""
@@ -485,21 +485,39 @@ def _check_closed(closure: SpaceClosure) -> None:
         )
     if not closure.freedom.redundant:
         return
+    sides = [*_states_beside(closure)]
+    if not all(any(found.status.has_pose for _, found in pair) for pair in sides):
+        raise _refusal_of(closure, 'open on both sides of the pose')
     each = max(2, int(_STATES ** (1.0 / len(pose))))
     gap, inputs = max(
         (closure.residual(found), at)
-        for at, found in ((pose, position), *grid_positions(closure, each))
+        for at, found in ((pose, position), *chain(*sides), *grid_positions(closure, each))
         if found.status.has_pose
     )
     if gap > _MET * size_of(closure.linkage):
-        count, places = closure.freedom.redundant, ', '.join(f'{value:.4g}' for value in inputs)
-        equations = f'{count} equation{"s" * (count != 1)}'
-        raise _OverconstrainedError(
-            'points',
-            f'the linkage is over-constrained: {equations} more than needed, missed by '
-            f'{gap:.3g} m where the input is {places}',
-            'let a hinge be a ball, or give the axes and lengths that meet them',
-        )
+        places = ', '.join(f'{value:.4g}' for value in inputs)
+        raise _refusal_of(closure, f'missed by {gap:.3g} m where the input is {places}')
+
+
+def _refusal_of(closure: SpaceClosure, why: str) -> _OverconstrainedError:
+    count = closure.freedom.redundant
+    return _OverconstrainedError(
+        'points',
+        f'the linkage is over-constrained: {count} equation{"s" * (count != 1)} more than '
+        f'needed, {why}',
+        'let a hinge be a ball, or give the axes and lengths that meet them',
+    )
+
+
+def _states_beside(closure: SpaceClosure) -> Iterator[list[tuple[tuple[float, ...], Position]]]:
+    """Yield the states beside the pose, for each input those on its two sides."""
+    for number, given in enumerate(closure.linkage.inputs):
+        sides = []
+        for way in (-_BESIDE, _BESIDE):
+            at = [*closure.linkage.pose.inputs]
+            at[number] += way * (closure.scale if given.slider else 1.0)
+            sides.append((tuple(at), closure.close_unlimited(*at)))
+        yield sides
 
 
 def _quaternion_of(columns: list[Vector]) -> Quaternion:

@@ -23,9 +23,8 @@ from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.batch import Array
-from linkage_ros.kinematics.space.carried_points import CarriedPoints
+from linkage_ros.kinematics.space.carried_points import CarriedPoints, SAME
 from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint
-from linkage_ros.kinematics.space.merged_pose import MERGED
 from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.kinematics.space.vectors import scale, Vector, ZERO
 import numpy as np
@@ -249,7 +248,7 @@ def _is_on_hinge(
     for hinge in linkage.hinges.values():
         arm = place - np.array(hinge.at) / carried.size
         axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
-        if {hinge.parent, hinge.child} == links and np.abs(np.cross(axis, arm)).max() < MERGED:
+        if {hinge.parent, hinge.child} == links and np.linalg.norm(np.cross(axis, arm)) < SAME:
             return True
     return False
 

@@ -13,28 +13,30 @@ Each linkage of the gallery is written as a URDF. Every origin and every rpy get
 joints are shuffled. What comes back is the linkage, but for what the noise does to its lengths.
 """
 
+from contextlib import suppress
 from math import dist, radians, remainder, tau
 from random import Random
 from xml.etree import ElementTree as ET
 
 from linkage_ros import load
 from linkage_ros.cli.main import main
+from linkage_ros.errors import FileError
 from linkage_ros.kinematics import RevoluteJoint, usual_inputs
 from linkage_ros.resources import linkage_names, spatial_linkage_names
 from linkage_ros.tools.models import model_of, urdf_model
 import pytest
 
-FINE, COARSE = (-19.0, -14.0), (-14.0, -9.0)
-"""Powers of ten between which noise is drawn, in [m] and [rad]."""
+FINE, COARSE, ROUGH = (-19.0, -14.0), (-14.0, -9.0), (-6.7, -6.0)
+"""Powers of ten between which noise is drawn, in [m] and [rad]; the last is that of six digits."""
 
 
 def with_noise(text, random, size):
-    """Return a URDF with noise on all of its joints, in a random order."""
+    """Return a URDF with noise on all of its joints and closings, in a random order."""
     robot = ET.fromstring(text)
-    for origin in robot.findall('joint/origin'):
-        for key in ('xyz', 'rpy'):
-            values = [float(one) + random.uniform(-size, size) for one in origin.get(key).split()]
-            origin.set(key, ' '.join(map(repr, values)))
+    for place in (*robot.findall('joint/*[@xyz]'), *robot.findall('loop_joint/*[@xyz]')):
+        for key in sorted({'xyz', 'rpy'} & {*place.attrib}):
+            values = [float(one) + random.uniform(-size, size) for one in place.get(key).split()]
+            place.set(key, ' '.join(map(repr, values)))
     parts = [part for part in robot if part.tag in ('joint', 'loop_joint')]
     for part in parts:
         robot.remove(part)
@@ -48,17 +50,9 @@ def models():
     return {}
 
 
-@pytest.mark.sample(7)
-@pytest.mark.parametrize('powers', [FINE, COARSE], ids=['fine', 'coarse'])
-@pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names()])
-def test_cad_noise_and_joint_order_change_no_pose(tmp_path, models, name, powers):
-    if name not in models:
-        models[name] = model_of(name, urdf_model).decode()
-    random, linkage = Random(f'{name} {powers}'), load(name)
-    size = 10.0 ** random.uniform(*powers)
-    file = tmp_path / 'robot.urdf'
-    file.write_text(with_noise(models[name], random, size))
-    robot = load(file)
+def check_poses(name, robot, random, size):
+    """Check the poses of a robot that is a linkage of the gallery but for noise of a size."""
+    linkage = load(name)
     inputs = linkage.linkage.inputs
     is_flat = name in linkage_names()
     pose = usual_inputs(linkage) if is_flat else linkage.linkage.pose.inputs
@@ -80,6 +74,33 @@ def test_cad_noise_and_joint_order_change_no_pose(tmp_path, models, name, powers
             assert abs(away) < 1e3 * size + 1e-13, (joint, size)
         closed += 1
     assert closed > 2
+
+
+@pytest.mark.sample(7)
+@pytest.mark.parametrize('powers', [FINE, COARSE], ids=['fine', 'coarse'])
+@pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names()])
+def test_cad_noise_and_joint_order_change_no_pose(tmp_path, models, name, powers):
+    if name not in models:
+        models[name] = model_of(name, urdf_model).decode()
+    random = Random(f'{name} {powers}')
+    size = 10.0 ** random.uniform(*powers)
+    file = tmp_path / 'robot.urdf'
+    file.write_text(with_noise(models[name], random, size))
+    check_poses(name, load(file), random, size)
+
+
+@pytest.mark.parametrize('name', ['bennett', 'wishbone'])
+def test_rounded_robot_is_right_or_refused(tmp_path, name):
+    """A point of two links may be next to the axis of their hinge, or miss it."""
+    file, random, count = tmp_path / 'robot.urdf', Random(name), 0
+    text = model_of(name, urdf_model).decode()
+    for _ in range(3):
+        size = 10.0 ** random.uniform(*ROUGH)
+        file.write_text(with_noise(text, random, size))
+        with suppress(FileError):
+            check_poses(name, load(file), random, size)
+            count += 1
+    assert count
 
 
 ANKLE = """
