@@ -79,6 +79,7 @@ from linkage_ros.kinematics.analysis.sweep_analysis import (
     check_turns as check_turns,
     conditioning_curves as conditioning_curves,
     find_extremes as find_extremes,
+    follow_grid as follow_grid,
     grid_positions as grid_positions,
     InputSweep as InputSweep,
     pose_alone as pose_alone,

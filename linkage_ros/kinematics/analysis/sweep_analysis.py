@@ -10,9 +10,11 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise, product
-from math import inf, isfinite, nan, pi, remainder, tau
+from math import inf, isfinite, nan, pi, prod, remainder, tau
+from operator import getitem
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names, quote
@@ -49,6 +51,9 @@ _GRID, _MOST_ON_GRID = 24, 14_000
 
 _FEW, _MOST_OF_MANY, _MOST_ITERATED = 3, 60, 1000
 """Inputs that so many states are meant for; how many of more inputs, and of iterated links."""
+
+_PART = 0.25
+"""How far a grid of many inputs reaches from the pose to limits of angles, where links iterate."""
 
 _SAME = 1e-9
 """Largest difference of values that count as equal, in [rad] or relative to a length."""
@@ -317,6 +322,11 @@ def grid_positions(
 
 def inputs_on_grid(closure: Closure, count: int = _GRID) -> Iterator[tuple[float, ...]]:
     """Yield a grid over all inputs: one turn each, or the reach of a slide."""
+    yield from product(*_values_on_grid(closure, count))
+
+
+def _values_on_grid(closure: Closure, count: int) -> list[list[float]]:
+    """Return the values of each input on a grid of so many steps, or of fewer."""
     ways, inputs_count = [], len(closure.linkage.inputs)
     most = _MOST_ITERATED if closure.grids else _MOST_ON_GRID
     most = most if inputs_count <= _FEW else _MOST_OF_MANY
@@ -334,7 +344,44 @@ def inputs_on_grid(closure: Closure, count: int = _GRID) -> Iterator[tuple[float
             ways.append([low + (high - low) * i / count for i in range(count + 1)])
         else:
             ways.append([tau * i / count for i in range(count)])
-    yield from product(*ways)
+    return ways
+
+
+def follow_grid(closure: Closure) -> list[tuple[tuple[float, ...], Position]]:
+    """
+    Return inputs and positions on a grid over all inputs to which steps lead from the pose.
+
+    Where links only close together an open state takes long: the steps end there. Of many inputs
+    the grid reaches a part of the way to limits of angles: little closes in those corners.
+    """
+    ways, given = _values_on_grid(closure, _GRID), closure.linkage.inputs
+    home = closure.linkage.pose.inputs
+    turns = [not (one.slider or one.limits.is_bounded) for one in given]
+    for k, at in enumerate(home if len(ways) > _FEW else ()):
+        if given[k].limits.is_bounded and not given[k].slider:
+            ways[k] = [at + _PART * (x - at) for x in ways[k]]
+    around = [
+        [bisect_left(values, at % tau if turning else at) - k for k in (1, 0)]
+        for values, at, turning in zip(ways, home, turns, strict=True)
+    ]
+    waiting, seen = [*product(*around)], set[tuple[int, ...]]()
+    found: dict[tuple[int, ...], tuple[tuple[float, ...], Position]] = {}
+    while waiting:
+        index = tuple(
+            k % len(values) if turning else min(max(k, 0), len(values) - 1)
+            for k, values, turning in zip(waiting.pop(), ways, turns, strict=True)
+        )
+        if index in seen:
+            continue
+        tell_progress('states examined', len(seen), prod(map(len, ways)))
+        seen.add(index)
+        inputs = tuple(map(getitem, ways, index))
+        position = closure.close_unlimited(*inputs)
+        if position.status.has_pose:
+            found[index] = inputs, position
+            for axis, by in product(range(len(index)), (-1, 1)):
+                waiting.append(tuple(k + by * (i == axis) for i, k in enumerate(index)))
+    return [found[index] for index in sorted(found)]
 
 
 def find_extremes(

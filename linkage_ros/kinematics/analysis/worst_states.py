@@ -10,16 +10,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from operator import itemgetter
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.analysis.ranges import is_iterated, sample_inputs
 from linkage_ros.kinematics.analysis.singularity_margin import step_margins
-from linkage_ros.kinematics.analysis.sweep_analysis import inputs_on_grid, InputSweep
-from linkage_ros.kinematics.compiling import Compiled, motion_at, TracedMotion
-from linkage_ros.kinematics.results import SingularityMargin
-from linkage_ros.progress import tell_progress
+from linkage_ros.kinematics.analysis.sweep_analysis import (
+    follow_grid,
+    inputs_on_grid,
+    InputSweep,
+)
+from linkage_ros.kinematics.compiling import Compiled, TracedMotion
+from linkage_ros.kinematics.results import Position, SingularityMargin
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure
@@ -38,29 +41,16 @@ class WorstStates(NamedTuple):
 def find_worst_states(closure: Closure) -> WorstStates | None:
     """Return the worst states over the range, or over a grid of several inputs; None if empty."""
     several = len(closure.linkage.inputs) > 1
-    if several:
-        tried = [*inputs_on_grid(closure)]
-    else:
-        ranges = InputSweep(closure).ranges
-        tried = [(value,) for interval in ranges for value in sample_inputs(interval)]
 
-    def measure(motion: TracedMotion) -> Sequence[Sequence[float]]:
-        position = motion.position
+    def measure(position: Position) -> Sequence[Sequence[float]]:
         if not position.status.has_pose:
             return [[], []]
         margins = step_margins(closure, position) if several else ()
         errors = closure.closing_errors(position)
         return [[0.0, *errors], [1.0, *(each.conditioning for each in margins)]]
 
-    compiled = None
-    if several and not is_iterated(closure):
-        compiled = Compiled(closure, 0, measure, within_limits=False)
     found = []
-    for done, inputs in enumerate(tried):
-        tell_progress('states examined', done, len(tried))
-        errors, margins = (
-            compiled(*inputs).values if compiled else measure(motion_at(closure, [inputs]))
-        )
+    for inputs, (errors, margins) in _measured_states(closure, measure):
         if errors:
             found.append((max(map(abs, errors)), round(min(margins), 9), inputs))
     if not found:
@@ -72,3 +62,24 @@ def find_worst_states(closure: Closure) -> WorstStates | None:
     nearest = min(found, key=itemgetter(1))[2]
     margin = closure.singularity_margin(closure.close_unlimited(*nearest))
     return WorstStates(residual, at, len(found), margin, nearest)
+
+
+def _measured_states(
+    closure: Closure, measure: Callable[[Position], Sequence[Sequence[float]]]
+) -> Iterator[tuple[tuple[float, ...], Sequence[Sequence[float]]]]:
+    """Yield the inputs of many states with what is measured there."""
+    if len(closure.linkage.inputs) == 1:
+        for interval in InputSweep(closure).ranges:
+            for value in sample_inputs(interval):
+                yield (value,), measure(closure.close_unlimited(value))
+    elif is_iterated(closure):
+        for inputs, position in follow_grid(closure):
+            yield inputs, measure(position)
+    else:
+
+        def measure_motion(motion: TracedMotion) -> Sequence[Sequence[float]]:
+            return measure(motion.position)
+
+        compiled = Compiled(closure, 0, measure_motion, within_limits=False)
+        for inputs in inputs_on_grid(closure):
+            yield inputs, compiled(*inputs).values

@@ -25,7 +25,7 @@ from typing import Any
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.analysis.crank_branches import crank_branches, joint_output
 from linkage_ros.kinematics.analysis.singularity_margin import signed_distance
-from linkage_ros.kinematics.analysis.sweep_analysis import inputs_on_grid
+from linkage_ros.kinematics.analysis.sweep_analysis import follow_grid, inputs_on_grid
 from linkage_ros.kinematics.batch import Array, Batch, CODES
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling import Compiled
@@ -38,11 +38,17 @@ _SAME = 1e-9
 _FEW = 3
 """Most inputs of which a grid is fine enough to search from."""
 
-_NEAR_ZERO, _ZERO = 0.25, 1e-7
-"""Upper bounds of the smallest singular value on the grid next to a zero, and of a zero."""
+_NEAR_ZERO, _ROUNDED, _ZERO = 0.25, 2e-6, 1e-7
+"""
+Upper bounds of the smallest singular value: on the grid next to a zero, where the search ends if
+CAD has rounded the lengths, and where it is met.
+"""
 
-_ROUNDS, _LESS = 100, 0.999
-"""Rounds of the search: each moves on to a value that is so much less, or halves its steps."""
+_ROUNDS, _LESS, _HALVED = 100, 0.999, 8
+"""
+Rounds of the search: each moves on to a value that is so much less, or halves its steps; and how
+often steps may be halved without the value: it falls with them next to a zero.
+"""
 
 
 def turning_points(closure: Closure) -> dict[str, list[float]]:
@@ -73,26 +79,30 @@ def find_standing_state(closure: Closure) -> tuple[float, ...] | None:
     count = len(closure.input_names)
     if not 1 < count <= _FEW or not closure.joint_names:
         return None
-    grid = np.array([*inputs_on_grid(closure)])
+    states: list[tuple[float, ...]] = []
+    if closure.grids:
+        states = [inputs for inputs, _ in follow_grid(closure)]
+    grid = np.array(states or [*inputs_on_grid(closure)])
     values = _smallest_singular_values(closure, grid)
     # Symmetrical linkages have several: the first, whatever the last digits are.
     number = int(np.argmin(values.round(9)))
     best, least = grid[number], values[number]
     steps = np.array([np.diff(np.unique(axis)).min(initial=1.0) for axis in grid.T])
     around = np.array([*product((0, -1, 1), repeat=count)])
-    for _ in range(_ROUNDS if least < _NEAR_ZERO else 0):
+    halved, before = 0, least
+    for _ in range(_ROUNDS if _ROUNDED <= least < _NEAR_ZERO else 0):
         tried = best + steps * around
         values = _smallest_singular_values(closure, tried)
         number = int(np.argmin(values))
         if values[number] < _LESS * least:
             best, least = tried[number], values[number]
         else:
-            steps *= 0.5
-        if least < _ZERO:
-            return tuple(best.tolist())
-        if steps.max(initial=0.0) < _SAME:
+            steps, halved = 0.5 * steps, halved + 1
+        if least < 0.5 * before:
+            halved, before = 0, least
+        if least < _ZERO or halved > _HALVED or steps.max(initial=0.0) < _SAME:
             break
-    return None
+    return tuple(best.tolist()) if least < _ROUNDED else None
 
 
 def _smallest_singular_values(closure: Closure, inputs: Array) -> Array:

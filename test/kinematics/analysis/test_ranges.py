@@ -23,6 +23,7 @@ from linkage_ros.kinematics import (
     describe_ranges,
     find_extremes,
     find_worst_states,
+    follow_grid,
     four_bar_type,
     four_bars,
     grid_positions,
@@ -544,6 +545,20 @@ def test_cylinder_loop_does_not_count_as_four_bar():
 def test_position_grid_covers_all_inputs():
     found = list(grid_positions(shipped('five_bar'), 6))
     assert len({inputs for inputs, _ in found}) == len(found) == 36
+
+
+def without_limits(closure):
+    return type(closure)(closure.linkage.with_limits(dict.fromkeys(closure.input_names, Limits())))
+
+
+def test_grid_followed_from_the_pose_finds_all_closed_states():
+    """Of two motors of an ankle that turn fully, a fifth is open; not all of that is tried."""
+    closure, tried = without_limits(shipped('ankle_motors')), []
+    expected = [at for at, one in grid_positions(closure) if one.status.has_pose]
+    close = closure.close_unlimited
+    closure.close_unlimited = lambda *inputs: tried.append(inputs) or close(*inputs)
+    assert [inputs for inputs, _ in follow_grid(closure)] == expected
+    assert len(expected) < len({*tried}) == len(tried) < len(list(grid_positions(closure)))
 
 
 # The name of a four-bar: Barker's fourteen types, and Grashof's inequality for the motion.
