@@ -35,6 +35,7 @@ CAMPAIGNS = {
     'inverse': 'campaigns.inverse',
     'kills': 'campaigns.reliability.kills',
     'mutants': 'campaigns.mutants',
+    'robots': 'campaigns.robots',
     'space': 'campaigns.space',
     'synthesis': 'campaigns.synthesis',
     'topologies': 'campaigns.topologies.run',

@@ -5,25 +5,24 @@
 # writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
-
-
 """
-``python -m campaigns.robots CHECKOUT …``: robots as they are published, each by one command.
+Robots as they are published, each by one command.
 
 A checkout is a folder with the name of one of the repositories in `ROBOTS`, or a robot's file.
-Each robot is read as its file is, and solved at random states near its pose. Another library,
-yourdfpy, places the links at the joints that were found: the frames of all that closes loops have
-to meet there. The page docs/robots.md says what it costs, and what is refused and why.
+Each robot is read as its file is, and solved at random states near its pose, from its motors to
+its joints and back. The judge places the links of the robot's URDF by its own formulas, and
+closes the loops from each state by Newton's method, with errors of 40 digits.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-import io
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from copy import copy
+from itertools import chain, combinations, islice
 from pathlib import Path
 import resource
-import shlex
 import signal
 import subprocess
 import sys
@@ -31,20 +30,33 @@ from time import process_time
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
+from bench import ROOT
+from bench.report import say, Table
+from campaigns.campaign import Findings, Page
 from linkage_ros.description import load, read_as_urdf
-from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics import Array, PlanarClosure
+from linkage_ros.errors import DefinitionError, LinkageError
+from linkage_ros.kinematics import PlanarClosure
+from mpmath import mp
 import numpy as np
-from trimesh.transformations import compose_matrix
-import yourdfpy
 
-PAGE = Path(__file__).parents[1] / 'docs' / 'robots.md'
-STATES, SEED = 50, 1
+STATES = 50
 LONGEST = 90
 """How long a robot may be read, in [s]."""
 
 FARTHEST = 0.15
 """How far inputs are drawn from the pose, in [rad]; slides a tenth of it, in [m]."""
+
+_DIGITS, _ROUNDS, _MET = 40, 8, 1e-25
+"""Digits of the judge, most steps of its method, and the last of them."""
+
+_STEP, _RANK = 1e-6, 1e-7
+"""Step of its slopes, in [rad] and [m], and singular values that are rounding."""
+
+_SETS, _TRIED = 3000, 12
+"""Sets of joints that may be inputs: so many are compared, and tried."""
+
+_WRONG = 1e-5
+"""Largest difference of a joint that CAD's rounding of redundant equations explains."""
 
 _LEG = ('motor_4barlink2', 'motor_4barlink4', 'motor_hip_x', 'motor_4barlink1', 'motor_4barlink3')
 _CASSIE = tuple(
@@ -102,22 +114,26 @@ ROBOTS: dict[str, dict[str, tuple[str, ...]]] = {
 }
 """Repositories and their robots with loops, each with inputs and values of a pose as typed."""
 
-_HEAD = f"""\
-# Robots as they are published
 
-This page is made by `python -m campaigns.robots CHECKOUT … --write`; do not edit it. The files
-are as published, and what was typed is below.
+PAGE = Page(
+    ROOT / 'docs' / 'robots.md',
+    'Robots as they are published',
+    f"""
+Made by `python -m campaigns robots CHECKOUT … --write`; do not edit it. The files are as
+published, and what was typed is below.
 
-{STATES} states are drawn within {FARTHEST} rad of the pose and the limits of the inputs. At their
-joints yourdfpy, a library of another make, places the links: "gap" is the farthest that ends of
-what closes a loop are apart there, "turn" by how much frames of welds and axes of hinges differ
-in direction. Pins of planar loops may end beside each other along their axes. "Check" is the
-processor time of the command, with the search for the pose; "a state" that of one position, the
-mean of all, most of them where none was solved before.
+{STATES} states are drawn within {FARTHEST} rad of the pose and the limits of the inputs. *Off* is
+the largest difference of a joint, in rad or m, from what the judge comes to: it places the links
+by formulas of its own, from the URDF that the file is or becomes, and closes the loops by Newton's
+method with 40 digits. Pins of planar loops may end beside each other. Where a robot has more
+equations than needed, their rounding by CAD decides its last digits: the judge takes least
+squares, the closure those that it needs.
 
-| robot | of | loops | inputs | joints found | check | a state | closed | gap | turn |
-| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
-"""
+*Back* gives as many joints as there are inputs, those that tell the inputs best in the pose, and
+finds the inputs. *Check* is the processor time of the command, with the search for the pose; *a
+state* that of one position, the mean of all, most of them where none was solved before.
+""",
+)
 
 
 class Robot(NamedTuple):
@@ -136,7 +152,7 @@ class Robot(NamedTuple):
 
     @property
     def options(self) -> dict[str, Any]:
-        """Return the same as options of `load`."""
+        """Return what is typed as options of `load`."""
         told = dict(word.split('=') for word in self.typed if '=' in word)
         inputs = [word for word in self.typed if '=' not in word]
         given = {'input': inputs} if inputs else {}
@@ -146,91 +162,221 @@ class Robot(NamedTuple):
     def command(self) -> list[str]:
         """Return what is typed, beside the checkout."""
         names = [(f'--{"start" if "=" in name else "input"}', name) for name in self.typed]
-        options = [word for pair in names for word in pair]
         file = str(Path(self.source.rpartition('/')[2], self.name))
-        return ['linkage', 'check', file, '--near', *options]
+        return ['linkage', 'check', file, '--near', *chain(*names)]
+
+
+class _Joint(NamedTuple):
+    """A joint of the tree."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    base: Any  # Frame of the child at 0, in that of the parent
+    axis: Any
+
+
+class _End(NamedTuple):
+    """An end of what closes a loop: a frame on a link, and an axis in that frame."""
+
+    link: str
+    frame: Any
+    axis: Any
 
 
 class _Loop(NamedTuple):
     """Two frames of links that meet, and what of their directions does."""
 
     kind: str
-    links: tuple[str, str]
-    frames: tuple[Array, Array]  # In those of the links
-    axes: tuple[Array, Array] | None  # Of a hinge, in these frames
-    is_directed: bool
+    ends: tuple[_End, _End]
+    has_axis: bool
 
 
-def _find_loops(root: ET.Element, model: yourdfpy.URDF) -> Iterator[_Loop]:
-    """Yield what closes the loops of a URDF."""
-    for loop in root:
-        if loop.tag in ('loop_joint', 'loop', 'loop_constraint', 'constraint'):
-            ends = [end for end in loop if 'link' in end.attrib][:2]
-            own = [end.find('origin') for end in ends]
-            origins = [end if at is None else at for end, at in zip(ends, own, strict=True)]
-            first, second = (_frame(origin.attrib) for origin in origins)
-            axis = loop.find('parent_axis')
-            axis = loop.find('axis') if axis is None else axis
-            way = (
-                None if axis is None else np.array([float(x) for x in axis.attrib['xyz'].split()])
-            )
-            yield _Loop(
-                loop.get('type', ''),
-                (ends[0].attrib['link'], ends[1].attrib['link']),
-                (first, second),
-                None if way is None else (way, way),
-                all('rpy' in origin.attrib for origin in origins),
-            )
-    for joint in root.findall('gazebo/joint'):
-        # A joint of SDF is where it is in the child with all joints at 0.
-        parent, child = (joint.findtext(end, '').strip() for end in ('parent', 'child'))
-        pose = joint.findtext('pose', '0 0 0 0 0 0').split()
-        there = _frame({'xyz': ' '.join(pose[:3]), 'rpy': ' '.join(pose[3:])})
-        model.update_cfg(dict.fromkeys(model.actuated_joint_names, 0.0))
-        on = np.linalg.inv(model.get_transform(parent)) @ model.get_transform(child) @ there
-        yield _Loop(joint.get('type', ''), (parent, child), (on, there), None, True)
+class Judge:
+    """A URDF's tree and loops, in numbers of any kind: floats, or those of mpmath."""
 
-
-def _frame(origin: dict[str, str]) -> Array:
-    """Return the matrix of an origin of a URDF."""
-    xyz, rpy = ([*map(float, origin.get(key, '0 0 0').split())] for key in ('xyz', 'rpy'))
-    return np.asarray(compose_matrix(translate=xyz, angles=rpy))
-
-
-class _Placed:
-    """The links of a robot as yourdfpy places them, and how far its loops are from closed."""
-
-    def __init__(self, data: bytes) -> None:
+    @mp.workdps(_DIGITS)
+    def __init__(self, data: bytes, left_out: Sequence[str] = (), *, is_planar: bool) -> None:
         root = ET.fromstring(data)
-        for joint in root.findall('joint'):
-            # Every joint has the value that was found for it.
-            for mimic in joint.findall('mimic'):
-                joint.remove(mimic)
-        self._model = yourdfpy.URDF.load(
-            io.BytesIO(ET.tostring(root)), load_meshes=False, load_collision_meshes=False
-        )
-        self.loops = [*_find_loops(root, self._model)]
+        self._is_planar, waiting = is_planar, [*map(_read_joint, root.findall('joint'))]
+        self.tree: list[_Joint] = []
+        while waiting:  # From the root on
+            left = {joint.child for joint in waiting}
+            self.tree += [joint for joint in waiting if joint.parent not in left]
+            waiting = [joint for joint in waiting if joint.parent in left]
+        self._followers = [
+            (joint.get('name', ''), mimic.attrib)
+            for joint in root.findall('joint')
+            for mimic in joint.findall('mimic')
+            if f'mimic of {joint.get("name")}' not in left_out
+        ]
+        self.loops = [*self._find_loops(root)]
+        self._rough = self._as_floats()
 
-    def errors(self, values: dict[str, float], is_planar: bool) -> tuple[float, float]:
-        """Return the largest gap, in [m], and difference of directions at values of joints."""
-        model, gap, turn = self._model, 0.0, 0.0
-        model.update_cfg({name: values.get(name, 0.0) for name in model.actuated_joint_names})
-        for loop in self.loops:
-            one, other = (
-                model.get_transform(link) @ frame
-                for link, frame in zip(loop.links, loop.frames, strict=True)
+    def _as_floats(self) -> Judge:
+        """Return the judge with doubles, which suffice for slopes."""
+        rough = copy(self)
+        rough.tree = [
+            joint._replace(base=joint.base.astype(float), axis=joint.axis.astype(float))
+            for joint in self.tree
+        ]
+        rough.loops = [
+            loop._replace(
+                ends=tuple(
+                    end._replace(frame=end.frame.astype(float), axis=end.axis.astype(float))
+                    for end in loop.ends
+                )
             )
-            apart = one[:3, 3] - other[:3, 3]
-            if loop.axes is not None and loop.kind in ('revolute', 'continuous'):
-                axes = [at[:3, :3] @ way for at, way in zip((one, other), loop.axes, strict=True)]
-                axes = [axis / np.linalg.norm(axis) for axis in axes]
-                turn = max(turn, float(np.linalg.norm(np.cross(*axes))))
-                if is_planar:
-                    apart -= apart @ axes[0] * axes[0]
-            elif loop.kind == 'fixed' and loop.is_directed:
-                turn = max(turn, float(np.abs(one[:3, :3] - other[:3, :3]).max()))
-            gap = max(gap, float(np.linalg.norm(apart)))
-        return gap, turn
+            for loop in self.loops
+        ]
+        return rough
+
+    def _find_loops(self, root: ET.Element) -> Iterator[_Loop]:
+        for loop in root:
+            if loop.tag in ('loop_joint', 'loop', 'loop_constraint', 'constraint'):
+                ends = [end for end in loop if 'link' in end.attrib][:2]
+                axis = loop.find('parent_axis')
+                axis = loop.find('axis') if axis is None else axis
+                way = _numbers({} if axis is None else axis.attrib, 'xyz', '1 0 0')
+                found = []
+                for end in ends:
+                    owns = (loop.find(f'{end.tag}_origin'), end.find('origin'), end)
+                    at = next(own for own in owns if own is not None)
+                    found.append(_End(end.attrib['link'], _frame(at.attrib), way / _size(way)))
+                directed = all('rpy' in end.attrib for end in ends)
+                kind = loop.get('type', '')
+                kind = 'ball' if kind == 'fixed' and not directed else kind
+                yield _Loop(kind, (found[0], found[1]), axis is not None)
+        frames = self._frames({})
+        for joint in root.findall('gazebo/joint'):
+            # A joint of SDF is where it is in the child with all joints at 0.
+            parent, child = (joint.findtext(end, '').strip() for end in ('parent', 'child'))
+            pose = joint.findtext('pose', '0 0 0 0 0 0').split()
+            there = _frame({'xyz': ' '.join(pose[:3]), 'rpy': ' '.join(pose[3:])})
+            on = _inverse(frames[parent]) @ frames[child] @ there
+            ends = _End(parent, on, _AXIS), _End(child, there, _AXIS)
+            yield _Loop(joint.get('type', ''), ends, has_axis=False)
+
+    def _frames(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the frames of all links."""
+        frames: dict[str, Any] = {}
+        for joint in self.tree:
+            frame = frames.setdefault(joint.parent, np.eye(4)) @ joint.base
+            value = values.get(joint.name, 0)
+            if value != 0 and joint.kind != 'fixed':
+                move = np.eye(4).astype(joint.base.dtype)
+                if joint.kind == 'prismatic':
+                    move[:3, 3] = value * joint.axis
+                else:
+                    move[:3, :3] = _turn(joint.axis, value)
+                frame = frame @ move
+            frames[joint.child] = frame
+        return frames
+
+    def misses(self, values: Mapping[str, Any]) -> Any:
+        """Return by how much each equation is missed at values of the joints."""
+        frames, found = self._frames(values), []
+        for loop in self.loops:
+            one, other = (frames[end.link] @ end.frame for end in loop.ends)
+            gap = one[:3, 3] - other[:3, 3]
+            axes = [at[:3, :3] @ end.axis for at, end in zip((one, other), loop.ends, strict=True)]
+            if loop.has_axis and loop.kind.removesuffix('_joint') in ('revolute', 'continuous'):
+                found += [*np.cross(*axes)]
+                if self._is_planar:
+                    gap = gap - (gap @ axes[0]) * axes[0]
+            elif loop.kind == 'fixed':
+                found += [*(one[:3, :3] - other[:3, :3]).ravel()]
+            found += [*gap]
+        for name, mimic in self._followers:
+            if name in values and mimic['joint'] in values:
+                own = mp.mpf(mimic.get('multiplier', '1')) * values[mimic['joint']]
+                found.append(values[name] - own - mp.mpf(mimic.get('offset', '0')))
+        return np.array(found)
+
+    @mp.workdps(_DIGITS)
+    def difference(self, values: Mapping[str, float], held: Sequence[str]) -> float:
+        """Return how far Newton's method moves a joint, if those that are held stay."""
+        free = [name for name in values if name not in held]
+        at = {name: mp.mpf(value) for name, value in values.items()}
+        slopes = []
+        for name in free:
+            high, low = ({**values, name: values[name] + by} for by in (_STEP, -_STEP))
+            slopes.append((self._rough.misses(high) - self._rough.misses(low)) / (2 * _STEP))
+        inverse = np.linalg.pinv(np.array(slopes, float).T, rcond=_RANK)
+        for _ in range(_ROUNDS):
+            errors = self.misses(at)
+            steps = _numbers_of(inverse) @ errors
+            at |= {name: at[name] - step for name, step in zip(free, steps, strict=True)}
+            if max(map(abs, steps), default=0) < _MET:
+                break
+        left = max(map(abs, self.misses(at)), default=0)
+        off = max((abs(at[name] - values[name]) for name in free), default=0)
+        return float(off if left < _WRONG else left)
+
+
+def _read_joint(joint: ET.Element) -> _Joint:
+    found = {child.tag: child.attrib for child in joint}
+    way = _numbers(found.get('axis', {}), 'xyz', '1 0 0')
+    way = way / (_size(way) or 1)
+    ends = (found[end]['link'] for end in ('parent', 'child'))
+    base = _frame(found.get('origin', {}))
+    return _Joint(joint.get('name', ''), joint.get('type', ''), *ends, base, way)
+
+
+def _numbers_of(values: Any) -> Any:
+    """Return numbers of mpmath."""
+    return np.vectorize(mp.mpf, otypes=[object])(values)
+
+
+def _numbers(attributes: Mapping[str, str], key: str, default: str) -> Any:
+    return np.array([mp.mpf(word) for word in attributes.get(key, default).split()])
+
+
+def _size(vector: Any) -> Any:
+    return mp.sqrt(vector @ vector)
+
+
+_EYE, _AXIS = _numbers_of(np.eye(4)), _numbers_of((1, 0, 0))
+
+
+def _turn(axis: Any, angle: Any) -> Any:
+    """Return the matrix of a turn about an axis of length 1: Rodrigues."""
+    x, y, z = axis
+    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    number = float if isinstance(angle, float) else mp.mpf
+    sine, cosine = number(mp.sin(angle)), number(mp.cos(angle))
+    return np.eye(3) + sine * skew + (1 - cosine) * (skew @ skew)
+
+
+def _frame(origin: Mapping[str, str]) -> Any:
+    """Return the matrix of an origin of a URDF: roll, pitch and yaw about fixed axes."""
+    turned = _numbers_of(np.eye(3))
+    for way, angle in zip(_numbers_of(np.eye(3)), _numbers(origin, 'rpy', '0 0 0'), strict=True):
+        turned = _turn(way, angle) @ turned
+    frame = _EYE.copy()
+    frame[:3, :3], frame[:3, 3] = turned, _numbers(origin, 'xyz', '0 0 0')
+    return frame
+
+
+def _inverse(frame: Any) -> Any:
+    back = frame.copy()
+    back[:3, :3] = frame[:3, :3].T
+    back[:3, 3] = -(frame[:3, :3].T @ frame[:3, 3])
+    return back
+
+
+def _drive_by_joints(closure: Any) -> Any:
+    """Return the closure with as many joints as inputs: those that tell these best, or None."""
+    slopes = np.array(closure.jacobian(closure.close_unlimited(*closure.linkage.pose.inputs)))
+    rows = [k for k, name in enumerate(closure.joint_names) if name not in closure.input_names]
+    sets = [*islice(combinations(rows, len(closure.input_names)), _SETS)]
+    least = {of: float(np.linalg.svd(slopes[[*of]], compute_uv=False)[-1]) for of in sets}
+    for rows in sorted(sets, key=least.__getitem__, reverse=True)[:_TRIED]:
+        if least[rows] > _RANK:
+            with suppress(DefinitionError):
+                return closure.driven_by(*(closure.joint_names[k] for k in rows))
+    return None
 
 
 def _check(robot: Robot) -> float:
@@ -243,43 +389,64 @@ def _check(robot: Robot) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def measure(robot: Robot, draw: np.random.Generator) -> tuple[str, str]:
+class Measured(NamedTuple):
+    """What was found of a way through a robot: from inputs to joints, or back."""
+
+    closed: int
+    off: float  # In [rad] or [m]
+    seconds: float  # For a state
+
+
+def solve_states(closure: Any, states: Sequence[Sequence[float]], judge: Judge) -> Measured:
+    """Solve states, and let them be judged."""
+    closed, off, solving = 0, 0.0, 0.0
+    for state in states:
+        begun = process_time()
+        position = closure.close_unlimited(*state)
+        solving += process_time() - begun
+        if position.joints:
+            closed += 1
+            values = dict(zip(closure.joint_names, position.joints, strict=True))
+            values |= dict(zip(closure.input_names, state, strict=True))
+            off = max(off, judge.difference(values, closure.input_names))
+    return Measured(closed, off, solving / len(states))
+
+
+def measure(robot: Robot, seed: int, states: int = STATES) -> tuple[list[str], str]:
     """Return a row of the page, and '' or why the robot is refused."""
-    file = robot.checkout / robot.name
+    file, draw = robot.checkout / robot.name, np.random.default_rng(seed)
     signal.signal(signal.SIGALRM, _give_up)
     signal.alarm(LONGEST)
     try:
         closure: Any = load(file, robot.options)
     except LinkageError as error:
-        return '', f'* {robot.title}, of {robot.source}: {error.reason}; {error.remedy}'
+        return [], f'{error.reason}; {error.remedy}'
     except _TooLongError:
-        return '', f'* {robot.title}, of {robot.source}: read for more than {LONGEST} s'
+        return [], f'read for more than {LONGEST} s'
     finally:
         signal.alarm(0)
-    checking, placed = _check(robot), _Placed(read_as_urdf(file))
+    is_planar = isinstance(closure, PlanarClosure)
+    judge = Judge(read_as_urdf(file), closure.linkage.left_out, is_planar=is_planar)
     inputs = closure.linkage.inputs
     far = np.array([FARTHEST * (0.1 if given.slider else 1.0) for given in inputs])
     start = np.array(closure.linkage.pose.inputs)
     low = np.maximum(start - far, [given.limits.low for given in inputs])
     high = np.minimum(start + far, [given.limits.high for given in inputs])
-    closed, gap, turn, solving = 0, 0.0, 0.0, 0.0
-    for _ in range(STATES):
-        state = draw.uniform(low, high)
-        begun = process_time()
-        position = closure.position(*state.tolist())
-        solving += process_time() - begun
-        if position.joints:
-            closed += 1
-            values = dict(zip(closure.joint_names, position.joints, strict=True))
-            values |= dict(zip(closure.input_names, state.tolist(), strict=True))
-            found = placed.errors(values, is_planar=isinstance(closure, PlanarClosure))
-            gap, turn = max(gap, found[0]), max(turn, found[1])
-    row = (
-        f'| {robot.title} | {robot.source} | {len(placed.loops)} | {len(inputs)} | '
-        f'{len(closure.joint_names)} | {checking:.1f} s | {solving / STATES * 1e6:.0f} µs | '
-        f'{closed} of {STATES} | {gap:.0e} m | {turn:.0e} |'
-    )
-    return row, ''
+    drawn = draw.uniform(low, high, (states, len(inputs))).tolist()
+    there = solve_states(closure, drawn, judge)
+    row = [
+        *(robot.title, robot.source, f'{len(judge.loops)}', f'{len(inputs)}'),
+        *(f'{len(closure.joint_names)}', f'{_check(robot):.1f}', f'{there.seconds * 1e6:.0f}'),
+        *(f'{there.closed} of {states}', f'{there.off:.0e}'),
+    ]
+    inverse = _drive_by_joints(closure)
+    if inverse is None:
+        return [*row, '', '', ''], ''
+    rows = [closure.joint_names.index(name) for name in inverse.input_names]
+    found = [closure.close_unlimited(*state).joints for state in drawn]
+    back = solve_states(inverse, [[of[k] for k in rows] for of in found if of], judge)
+    last = f'{back.seconds * 1e6:.0f}', f'{back.closed} of {states}', f'{back.off:.0e}'
+    return [*row, *last], ''
 
 
 class _TooLongError(Exception):
@@ -302,27 +469,43 @@ def _find_robots(place: Path) -> list[Robot]:
     ]
 
 
-def main() -> int:
-    """Measure robots."""
-    parser = argparse.ArgumentParser('python -m campaigns.robots', description=__doc__)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of this campaign; it runs in one process."""
+    parser.set_defaults(jobs=1)
     names = ', '.join(ROBOTS)
     parser.add_argument('place', type=Path, nargs='+', help=f'a robot, or a checkout: {names}')
-    parser.add_argument('--write', action='store_true', help='write docs/robots.md')
-    options = parser.parse_args()
-    rows, refused, typed, plain = [], [], [], 0
-    for robot in (robot for place in options.place for robot in _find_robots(place)):
-        row, reason = measure(robot, np.random.default_rng(SEED))
-        print(row or reason, flush=True)
-        (rows if row else refused).append(row or reason)
-        plain += bool(row and not robot.typed)
-        typed.append(shlex.join(robot.command))
-    block = ['```sh no-test: needs a checkout of the robots', *typed, '```']
-    count = f'{len(rows)} of {len(typed)} robots run, {plain} of them with `--near` alone.'
-    page = [_HEAD + '\n'.join(rows), '', count, '', '## Refused, and why', '', *refused, '']
-    if options.write:
-        PAGE.write_text('\n'.join([*page, '## What was typed', '', *block, '']), 'utf-8')
-    return 0
 
 
-if __name__ == '__main__':
-    raise SystemExit(main())
+def run(options: argparse.Namespace) -> Findings:
+    """Measure robots."""
+    head = (
+        'robot',
+        'of',
+        'loops',
+        'inputs',
+        'joints',
+        'check [s]',
+        'a state [µs]',
+        'closed',
+        'off',
+    )
+    table = Table('Found', (*head, 'back [µs]', 'closed', 'off'))
+    refused = Table('Refused, and why', ('robot', 'of', 'why'))
+    typed = Table('What was typed', ('robot', 'typed'))
+    faults, plain = [], 0
+    robots = [robot for place in options.place for robot in _find_robots(place)]
+    for robot in robots:
+        row, reason = measure(robot, options.seed)
+        say(' '.join(row) or f'{robot.title}: {reason}')
+        if row:
+            table.rows.append(row)
+            plain += not robot.typed
+            faults += [
+                f'{robot.title}: {off} off' for off in row[8::3] if float(off or 0) > _WRONG
+            ]
+        else:
+            refused.rows.append((robot.title, robot.source, reason))
+        typed.rows.append((robot.title, f'`{" ".join(robot.command)}`'))
+    count = f'{len(table.rows)} of {len(robots)}', f'{plain}'
+    facts = [('robots that run', count[0]), ('of these with `--near` alone', count[1])]
+    return Findings([table, refused, typed], faults, facts)
