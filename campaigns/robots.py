@@ -21,6 +21,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from itertools import chain, combinations, islice
+import math
 from pathlib import Path
 import resource
 import signal
@@ -52,7 +53,7 @@ _DIGITS, _ROUNDS, _MET = 40, 8, 1e-25
 _STEP, _RANK = 1e-6, 1e-7
 """Step of its slopes, in [rad] and [m], and singular values that are rounding."""
 
-_SETS, _TRIED = 3000, 12
+_SETS, _TRIED = 2000, 4
 """Sets of joints that may be inputs: so many are compared, and tried."""
 
 _WRONG = 1e-5
@@ -100,7 +101,12 @@ ROBOTS: dict[str, dict[str, tuple[str, ...]]] = {
         'src/reachy_mini/descriptions/reachy_mini/mjcf/reachy_mini.xml': (),
     },
     'Rhoban/placo-examples': {'models/spm/robot.xml': ('m1', 'm2', 'm3')},
-    'Rhoban/onshape-to-robot-examples': {'planar-2dof/robot.xml': ()},
+    'Rhoban/onshape-to-robot-examples': {
+        'planar-2dof/robot.xml': (),
+        'orbita_mujoco/robot.xml': (),
+    },
+    'KennyVilella/excavator_simulator_mujoco': {'model/excavator/excavator.xml': ()},
+    's-ritwik/Gazebo_stewart_platform': {'models/stewart/stewart_sdf.sdf': ()},
     'ROAM-Lab-ND/generalized_rbda': {
         'robot-models/four_bar.urdf': (),
         'robot-models/planar_leg_linkage.urdf': (),
@@ -344,8 +350,8 @@ def _turn(axis: Any, angle: Any) -> Any:
     """Return the matrix of a turn about an axis of length 1: Rodrigues."""
     x, y, z = axis
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    number = float if isinstance(angle, float) else mp.mpf
-    sine, cosine = number(mp.sin(angle)), number(mp.cos(angle))
+    of = math if isinstance(angle, float) else mp
+    sine, cosine = of.sin(angle), of.cos(angle)
     return np.eye(3) + sine * skew + (1 - cosine) * (skew @ skew)
 
 

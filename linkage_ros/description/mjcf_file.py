@@ -33,14 +33,14 @@ from linkage_ros.kinematics import (
 )
 
 _NOT_PLAIN = (
-    'include', 'plugin', 'extension', 'model', 'attach', 'replicate', 'composite', 'flexcomp',
+    'include', 'model', 'attach', 'replicate', 'composite', 'flexcomp',
 )  # fmt: skip
-"""Elements that read files, run code or stand for many others."""
+"""Elements that read files or stand for many others."""
 
 _NOT_READ = (
-    'asset', 'sensor', 'contact', 'visual', 'statistic', 'actuator', 'deformable',
-    'custom', 'size', 'option', 'geom', 'camera', 'light', 'skin', 'mesh', 'hfield', 'texture',
-    'material', 'spatial', 'pair', 'motor', 'position', 'velocity',
+    'asset', 'sensor', 'contact', 'plugin', 'extension', 'visual', 'statistic', 'actuator',
+    'deformable', 'custom', 'size', 'option', 'geom', 'camera', 'light', 'skin', 'mesh', 'hfield',
+    'texture', 'material', 'spatial', 'pair', 'motor', 'position', 'velocity',
     'general', 'damper', 'cylinder', 'muscle', 'adhesion', 'intvelocity', 'equality',
 )  # fmt: skip
 """Elements, also in defaults, without which bodies, joints and sites are the same."""

@@ -181,6 +181,21 @@ def test_mjcf_loops_close_in_mujoco():
         assert mujoco_gap(model, data, closure, (knee, foot)) < 1e-12
 
 
+def test_plugins_of_an_mjcf_are_left_out(tmp_path):
+    """MuJoCo refuses a plugin that it does not know: here it never sees one."""
+    text = (ROBOTS / 'cassie_leg.xml').read_text('utf-8')
+    plugin = '<extension><plugin plugin="a.soil"><instance name="s"/></plugin></extension>'
+    geometry = '<geom type="sphere" size="0.01"><plugin instance="s"/></geom>'
+    assert text.count('</body>') > 1
+    file = tmp_path / 'leg.xml'
+    text = text.replace('</body>', f'{geometry}</body>', 1)
+    file.write_text(text.replace('</mujoco>', f'{plugin}</mujoco>'), 'utf-8')
+    plain, found = (load(of, {'near': True}) for of in (ROBOTS / 'cassie_leg.xml', file))
+    assert joints_at(found, found.linkage.pose.inputs) == joints_at(
+        plain, plain.linkage.pose.inputs
+    )
+
+
 def test_mjcf_joint_and_tendon_equalities_become_ratios(tmp_path):
     pytest.importorskip('mujoco')
     (tmp_path / 'tied.xml').write_text("""\
@@ -255,8 +270,6 @@ REFUSED = {
                 'r.sdf: joint j: its axis is 0 0 0; write 0 0 1, for example'),
     'another file': ('r.xml', BODY.format('<include file="/etc/passwd"/>'),
                      ('r.xml: has an element <include>; write a plain file: mj_saveLastXML')),
-    'a plugin': ('r.xml', BODY.format('<extension><plugin plugin="a"/></extension>'),
-                 ('r.xml: has an element <plugin>; write a plain file: mj_saveLastXML')),
     'bodies by number': ('r.xml', BODY.format('<worldbody><replicate count="3"/></worldbody>'),
                          'r.xml: has an element <replicate>; write a plain file: mj_saveLastXML'),
     'no model of MuJoCo': ('r.xml', BODY.replace('name="j"', 'nam="j"').format(''),
