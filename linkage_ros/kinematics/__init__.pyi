@@ -8,7 +8,7 @@
 
 # Read first: Closure, PlanarClosure, SpaceClosure, Linkage, SpaceLinkage, JointedLinkage,
 # RevoluteJoint, SlideJoint, Slider, SpatialJoint, Status, Position, Velocity, Acceleration,
-# InputRange, SingularityMargin, RRRDyad, Driven, Structure, evaluate_constraints.
+# InputRange, SingularityMargin, RRRDyad, Driven, Structure.
 
 from linkage_ros.kinematics.analysis.carried_efforts import CarriedEfforts as CarriedEfforts
 from linkage_ros.kinematics.analysis.crank_branches import CrankBranch as CrankBranch
@@ -118,15 +118,6 @@ from linkage_ros.kinematics.doubles import (
     SHRINK as SHRINK,
 )
 from linkage_ros.kinematics.iterated.elimination import Elimination as Elimination
-from linkage_ros.kinematics.iterated.equations import (
-    BodyDirection as BodyDirection,
-    CoincidentPoints as CoincidentPoints,
-    Constraint as Constraint,
-    End as End,
-    evaluate_constraints as evaluate_constraints,
-    OnLine as OnLine,
-    Parallel as Parallel,
-)
 from linkage_ros.kinematics.iterated.grid import Grid as Grid
 from linkage_ros.kinematics.iterated.start_table import StartTable as StartTable
 from linkage_ros.kinematics.limits import Bound as Bound

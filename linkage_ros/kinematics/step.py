@@ -124,6 +124,13 @@ class Step:
         """Return the ratio of the smallest singular value of its Jacobian to the largest."""
         raise NotImplementedError
 
+    def iterate_by(self, steps: int, halvings: int) -> None:
+        """
+        Let it take so many steps of Newton's method, from cells halved so often, if it iterates.
+
+        That is for measurements: by itself it takes as many as end within the rounding.
+        """
+
     @property
     def equation_count(self) -> int:
         """Return the number of equations that it solves at once."""

@@ -187,7 +187,7 @@ class BranchGroup(IteratedGroup):
                 unknowns, length = unknowns - step, float(np.abs(step[free]).sum())
             return length <= _LAST_STEP / 16.0
 
-        return make_start_table(branch.pieces(), solution_at, converges)
+        return make_start_table(branch.pieces(), solution_at, converges, self.halvings)
 
     def solution_at(self, x: float) -> Array | None:
         """Return the unknowns at a value of the input; None outside the branch."""
@@ -220,7 +220,8 @@ class BranchGroup(IteratedGroup):
         if status is not Status.CLOSED:
             return GroupPose(status, (), ())
         values, farthest = table.find_start(x)
-        for most in (farthest, _LAST_STEP):
+        chosen = self.steps
+        for most in (farthest, _LAST_STEP) if chosen is None else [farthest] * chosen:
             errors, solve = self._equations.linearize(known, values)
             step = solve(errors)
             if not sum(map(abs, step[1:]), abs(step[0])) <= most:

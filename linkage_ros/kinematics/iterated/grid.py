@@ -173,7 +173,7 @@ class Grid:
     """
     The cells of a group of links about a pose, whose unknowns are given.
 
-    ``numbers`` are those of its inputs among all that the linkage has.
+    ``numbers`` are those of its inputs among all that the linkage has; cells are halved so often.
     """
 
     def __init__(
@@ -182,6 +182,7 @@ class Grid:
         inputs: Sequence[GridInput],
         numbers: Sequence[int],
         unknowns: Sequence[float],
+        halvings: int = 0,
     ) -> None:
         self._group, self._inputs, self.numbers = group, inputs, numbers
         count = len(inputs)
@@ -193,8 +194,8 @@ class Grid:
         self._kept: dict[Key, _Found] = {}
         self._ways: dict[Key, _Found] = {}
         self._most_kept = _KEPT // len(self._given.numbers)
+        self.widths = [ldexp(_WIDTH, -halvings - level) for level in range(_LEVELS)]
         self._look_up = self._write_look_up()
-        self.widths = [ldexp(_WIDTH, -level) for level in range(_LEVELS)]
         self._corners: list[tuple[float, ...]] = list(product((-0.5, 0.5), repeat=count))
         if count > _MOST_CORNERED:
             axes = [
@@ -244,7 +245,7 @@ class Grid:
         """Return a call as a function, written for these inputs: most lie in a widest cell."""
         names = [f'q{k}' for k in range(len(self.home))]
         places = [
-            f'round(({name} - {home!r}) / {_WIDTH!r})'
+            f'round(({name} - {home!r}) / {self.widths[0]!r})'
             for name, home in zip(names, self.home, strict=True)
         ]
         given = ', '.join(names)

@@ -107,7 +107,7 @@ class GridGroup(IteratedGroup):
     def grid(self) -> Grid:
         """Return the cells from which the equations are solved."""
         inputs = [self._given_inputs[k] for k in self.inputs]
-        return Grid(self, inputs, self.inputs, self._start)
+        return Grid(self, inputs, self.inputs, self._start, self.halvings)
 
     @BuiltProperty
     def _step_count(self) -> int:
@@ -138,10 +138,12 @@ class GridGroup(IteratedGroup):
         if values is None:
             raise UndecidedError
         step: Sequence[Any] = ()
-        for _ in range(self._step_count):
+        for _ in range(self._step_count if self.steps is None else self.steps):
             errors, solve = self._equations.linearize(known, values)
             step = solve(errors)
             values = [subtract(value, change) for value, change in zip(values, step, strict=True)]
+        if self.steps is not None:
+            return values
         step = solve(self._equations.errors(known, values))
         if not sum(map(abs, step[1:]), abs(step[0])) <= _LAST_STEP:
             raise UndecidedError

@@ -177,6 +177,12 @@ class IteratedGroup:
     ``start`` has unknowns in the pose.
     """
 
+    steps: int | None = None
+    """Steps of Newton's method; None: as many as end within the rounding."""
+
+    halvings = 0
+    """How often the cells are halved that the method starts from."""
+
     def __init__(
         self,
         equations: Equations,

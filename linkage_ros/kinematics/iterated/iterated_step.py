@@ -114,6 +114,9 @@ class IteratedStep(Step):
     @BuiltProperty
     def group(self) -> BranchGroup | GridGroup | None:
         """Return where solutions start; None if the pose leads to none, of several inputs."""
+        return self._make_group()
+
+    def _make_group(self) -> BranchGroup | GridGroup | None:
         equations, before, system = self._equations, self._before, self._system
         inputs: tuple[int, ...] = (0,)
         if len(before.inputs) > 1:
@@ -234,6 +237,13 @@ class IteratedStep(Step):
             'rates': rates,
             'changes': changes,
         }
+
+    def iterate_by(self, steps: int, halvings: int) -> None:
+        """Let it take so many steps, from cells halved so often; see `Step`."""
+        group = self._make_group()
+        if group is not None:
+            group.steps, group.halvings = steps, halvings
+        self.group = group
 
     # What checks ask for
 

@@ -59,6 +59,21 @@ class StartRow(NamedTuple):
     folds: float  # −1 or 1 if the branch turns back at the low or the high end, otherwise 0
     is_away: bool = False  # Whether links are far away there
 
+    def input_at(self, part: float) -> float:
+        """Return the input at a part of the row, of the root where the branch turns back."""
+        low, high, folds, _ = self
+        begin, length = (high, low - high) if folds > 0.0 else (low, high - low)
+        return begin + length * (part * part if folds else part)
+
+    def halve(self) -> tuple[StartRow, StartRow]:
+        """Return both halves."""
+        low, high, folds, is_away = self
+        middle = _round_binary(self.input_at(0.5), high - low, _INPUT_DIGITS)
+        return (
+            StartRow(low, middle, min(folds, 0.0), is_away),
+            StartRow(middle, high, max(folds, 0.0), is_away),
+        )
+
 
 class StartTable:
     """
@@ -107,13 +122,16 @@ def make_start_table(
     pieces: Sequence[StartRow],
     solution_at: Callable[[float], Array | None],
     converges: Callable[[float, Array], bool],
+    halvings: int = 0,
 ) -> StartTable | None:
     """
     Return the table over adjacent pieces of a branch, in ascending order; None if there are none.
 
     ``solution_at`` gives the free unknowns at an input. ``converges`` says whether Newton's method
-    converges fast enough from free unknowns.
+    converges fast enough from free unknowns. Each piece is halved so often at least.
     """
+    for _ in range(halvings):
+        pieces = [half for piece in pieces for half in piece.halve()]
     ends, rows = [], []
     shortest = _SHORTEST * (pieces[-1].high - pieces[0].low) if pieces else 0.0
     for piece in pieces:
@@ -142,18 +160,15 @@ def _fit_rows(
 
     low, high, folds, _ = piece
     begin, length = (high, low - high) if folds > 0.0 else (low, high - low)
-
-    def input_at(part: float) -> float:
-        return begin + length * (part * part if folds else part)
-
-    solutions = [solution_at(input_at(part)) for part in _THIRDS]
+    solutions = [solution_at(piece.input_at(part)) for part in _THIRDS]
     known = [each for each in solutions if each is not None]
     if len(known) == len(solutions) and length:
         values = np.array(known)
         size = float(np.abs(values - values[0]).max())
         cubics = np.linalg.solve(np.vander(_THIRDS, increasing=True), values)
         cubics = _round_binary(cubics, size or 1.0, _DIGITS)
-        if all(converges(input_at(part), np.power(part, range(4)) @ cubics) for part in _TRIED):
+        tried = [(piece.input_at(part), np.power(part, range(4)) @ cubics) for part in _TRIED]
+        if all(converges(*start) for start in tried):
             farthest = min(2.0**-10, ldexp(1.0, frexp(size or 1.0)[1] - 4))
             start = _round_binary(begin, length, _INPUT_DIGITS) if folds else begin
             head = (
@@ -168,9 +183,8 @@ def _fit_rows(
     if not left or not length or high - low <= shortest:
         yield high, (begin, 0.0, 0.0, 0.0)
         return
-    middle = _round_binary(input_at(0.5), length, _INPUT_DIGITS)
-    for part in (StartRow(low, middle, min(folds, 0.0)), StartRow(middle, high, max(folds, 0.0))):
-        yield from _fit_rows(part, solution_at, converges, (left - 1, shortest))
+    for half in piece.halve():
+        yield from _fit_rows(half, solution_at, converges, (left - 1, shortest))
 
 
 def _round_binary(values: Any, size: float, digits: int) -> Any:

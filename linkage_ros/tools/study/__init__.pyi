@@ -53,11 +53,8 @@ from linkage_ros.tools.study.drive_step import (
     measure_drive_step as measure_drive_step,
     NAME as NAME,
 )
-from linkage_ros.tools.study.enclosure import (
-    prove as prove,
-    SingularError as SingularError,
-    solve as solve,
-)
+from linkage_ros.tools.study.enclosure import prove as prove, solve as solve
+from linkage_ros.tools.study.exact_constraints import SingularError as SingularError
 from linkage_ros.tools.study.measure import (
     ERRORS as ERRORS,
     measure_budget as measure_budget,

@@ -13,9 +13,10 @@ The drive runs as in the node, with the same commands at the same times, and its
 ticks are compared with the exact ones. These come from `linkage_ros.tools.study.exact_drive`, and
 their own error from a second run at ten times the tolerance: it falls as the power 7/8 of the
 tolerance at least, so a sixth of the difference is at least the error of the first. Where
-scipy is not installed or a winding adds a state, the exact motion is that of the drive itself at a
-sixteenth of its step, or what there is time for; its own error is a third of the difference from
-twice that step, as for a method of order 2.
+scipy is not installed, a winding adds a state or there are several inputs, the exact motion is
+that of the drive itself at a sixteenth of its step, or what there is time for, by rk4 if its own
+method is of order 1; its own error is a third of the difference from twice that step, as for a
+method of order 2.
 """
 
 from __future__ import annotations
@@ -87,7 +88,8 @@ def measure_drive_step(
     # However little time it has, it repeats some runs.
     span, time = (0.2, 0.3) if quick else (1.0, 2.0)
     price = _measure_price(motion, rate, min(horizon, span), time)
-    finest = next((n for n in (16, 8) if 1.5 * n * taken <= seconds), 4)
+    slower = _EVALUATIONS[_exact_method(use)] / _EVALUATIONS[use.method]
+    finest = next((n for n in (16, 8) if 1.5 * n * slower * taken <= seconds), 4)
     exact, doubt = exact_cranks(motion, ticks, finest)
     joints, _ = joints_at(motion.closure, exact)
     floor = doubt or JointError(0.0, 0.0)
@@ -116,9 +118,9 @@ def measure_drive_step(
         settings.append(Setting(_setting_label(method, step), error, None, changes))
     progress(1.0)
     note = motion.note
-    if _stands_in(use):
-        note += f'; for the exact motion stands the drive at 1/{finest} of its step, known to '
-        note += f'{floor.worst:.1g} rad'
+    if _stands_in(motion):
+        note += f'; for the exact motion stands the drive at 1/{finest} of its step by '
+        note += f'{_exact_method(use)}, known to {floor.worst:.1g} rad'
     if floor.worst > _UNSURE:
         note += f'; two motions that are nearly equal part: this one is known to {floor.worst:.1g}'
     if left_out:
@@ -148,9 +150,10 @@ def exact_cranks(
     LinkageError is raised if the motion ends before the last time.
     """
     use: TorqueDrive = motion.scene_linkage.drive[1]
-    if _stands_in(use):
+    if _stands_in(motion):
         steps = (max(_SHORTEST, use.step / finest), max(2.0 * _SHORTEST, 2.0 * use.step / finest))
-        one, other = (cranks_at(motion, times, step=step) for step in steps)
+        method = _exact_method(use)
+        one, other = (cranks_at(motion, times, method=method, step=step) for step in steps)
         part = 3.0
     else:
         one, other = (_integrate_exactly(motion, times, factor) for factor in (1.0, 10.0))
@@ -159,10 +162,16 @@ def exact_cranks(
     return one, doubt and JointError(doubt.rms / part, doubt.worst / part)
 
 
-def _stands_in(use: TorqueDrive) -> bool:
+def _stands_in(motion: LinkageMotion) -> bool:
     """Return whether the drive itself, with a short step, stands in for the exact motion."""
-    wound = use.motor is not None and use.motor.inductance > 0.0
-    return wound or find_spec('scipy') is None
+    motor = motion.scene_linkage.drive[1].for_input(motion.closure.input_names[0]).motor
+    wound = motor is not None and motor.inductance > 0.0
+    return wound or len(motion.closure.input_names) > 1 or find_spec('scipy') is None
+
+
+def _exact_method(use: TorqueDrive) -> str:
+    """Return the method by which the drive stands in for the exact motion."""
+    return use.method if METHODS[use.method].order > 1 else 'rk4'
 
 
 def _integrate_exactly(
@@ -172,13 +181,15 @@ def _integrate_exactly(
 
     drive = build_drive(motion)
     use: TorqueDrive = motion.scene_linkage.drive[1]
-    delay = use.motor.delay if use.motor else 0.0
+    motor = use.for_input(motion.closure.input_names[0]).motor
     changes: list[tuple[float, float | None]] = [(0.0, None)]
+    delay = motor.delay if motor else 0.0
     for command in motion.commands:
         at = command.time * 1e-9 + delay
         if len(changes) > 1 and at > changes[-1][0] + use.timeout:
             changes.append((changes[-1][0] + use.timeout, None))
-        changes.append((at, command.effort))
+        (effort,) = command.efforts
+        changes.append((at, effort))
     if motion.commands:
         changes.append((changes[-1][0] + use.timeout, None))
     acting = [

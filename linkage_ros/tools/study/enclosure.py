@@ -19,6 +19,8 @@ are of second degree at most::
     block      u1 e^{i·angle} × u2 = 0
     input      u1 e^{iφ} × u2 = 0, or (p2 + u2 z2 − p1 − u1 t) · u1 d = s
 
+In space `linkage_ros.tools.study.spatial_enclosure` has the constraints.
+
 The derivatives of a sum of c·x_i·x_j, with x_0 = 1, come from the product rule; none is derived by
 hand. Krawczyk's operator shows that a ball X about m holds exactly one solution: with Y near
 J(m)⁻¹, this is so if m − Y·F(m) + (1 − Y·J(X))·(X − m) lies inside X (R. Krawczyk, Computing 4,
@@ -30,10 +32,18 @@ from __future__ import annotations
 from cmath import rect
 from collections.abc import Sequence
 from math import frexp
-from typing import Any, NamedTuple
+from typing import Any
 
 from flint import acb, arb, arb_mat, ctx
-from linkage_ros.kinematics import GROUND, Linkage, PlanarClosure, RevoluteJoint
+from linkage_ros.kinematics import Closure, GROUND, PlanarClosure, RevoluteJoint
+from linkage_ros.tools.study.exact_constraints import (
+    constant_term,
+    evaluate_terms,
+    ExactConstraints,
+    Proof,
+    SingularError,
+    Term,
+)
 
 _PRECISIONS = (512, 1024, 2048)
 """Precisions in bits; the next is tried if one proves nothing."""
@@ -44,24 +54,9 @@ _RADIUS = 150
 Form = list[tuple[int, Any]]
 """A position or direction: complex factors by the number of their unknown."""
 
-Term = tuple[tuple[Any, Any, Any], int, int]
-"""A factor with its first and second time derivative, and the numbers of two unknowns."""
-
-
-class SingularError(Exception):
-    """At a toggle or a change point there is nothing to prove."""
-
-
-class Proof(NamedTuple):
-    """Balls that hold the published joints, their rates and accelerations; angles modulo 2π."""
-
-    joints: tuple[Any, ...]
-    rates: tuple[Any, ...]
-    accelerations: tuple[Any, ...]
-
 
 def prove(
-    linkage: Linkage,
+    closure: Closure,
     inputs: Sequence[float],
     rates: Sequence[float] | None = None,
     accelerations: Sequence[float] | None = None,
@@ -69,20 +64,16 @@ def prove(
     """
     Return a verified state near the closure's own; without rates, the inputs move at 1.
 
-    A SingularError says that nothing can be proved, at a toggle or a change point, a ValueError
-    that the linkage does not close.
+    A SingularError says that nothing can be proved, at a toggle or a change point, or of a linkage
+    with more constraints than unknowns, a ValueError that the linkage does not close.
     """
     rates = [1.0] * len(inputs) if rates is None else rates
     accelerations = [0.0] * len(inputs) if accelerations is None else accelerations
     before = ctx.prec
     try:
         for ctx.prec in _PRECISIONS:
-            equations = _ExactConstraints(
-                linkage, [*zip(inputs, rates, accelerations, strict=True)]
-            )
-            found = _prove_solution(
-                equations, equations.initial_unknowns(PlanarClosure(linkage), inputs)
-            )
+            equations = constraints_of(closure, inputs, rates, accelerations)
+            found = _prove_solution(equations, equations.initial_unknowns(closure, inputs))
             if found is not None:
                 return equations.prove_joints(found)
     finally:
@@ -90,14 +81,12 @@ def prove(
     raise SingularError(f'{tuple(inputs)}: nothing is proved')
 
 
-def solve(linkage: Linkage, inputs: Sequence[float], bits: int) -> tuple[Any, ...]:
+def solve(closure: Closure, inputs: Sequence[float], bits: int) -> tuple[Any, ...]:
     """Return the joints at a precision in bits, by Newton's method and without a proof."""
     before, ctx.prec = ctx.prec, bits
     try:
-        equations = _ExactConstraints(linkage, [(value, 1.0, 0.0) for value in inputs])
-        found = _iterate_newton(
-            equations, equations.initial_unknowns(PlanarClosure(linkage), inputs)
-        )
+        equations = constraints_of(closure, inputs)
+        found = _iterate_newton(equations, equations.initial_unknowns(closure, inputs))
         if found is None:
             raise SingularError(f'{tuple(inputs)}: nothing converges')
         return equations.joint_values(found)
@@ -105,20 +94,51 @@ def solve(linkage: Linkage, inputs: Sequence[float], bits: int) -> tuple[Any, ..
         ctx.prec = before
 
 
-class _ExactConstraints:
-    """The constraints of a linkage as sums of products of two unknowns."""
+def constraints_of(
+    closure: Closure,
+    inputs: Sequence[float],
+    rates: Sequence[float] | None = None,
+    accelerations: Sequence[float] | None = None,
+) -> ExactConstraints:
+    """
+    Return the constraints of a linkage at inputs; without rates, these move at 1.
 
-    def __init__(self, linkage: Linkage, driven: Sequence[tuple[float, float, float]]) -> None:
-        self._linkage = linkage
+    A SingularError says that they are not as many as unknowns.
+    """
+    rates = [1.0] * len(inputs) if rates is None else rates
+    accelerations = [0.0] * len(inputs) if accelerations is None else accelerations
+    driven = [*zip(map(arb, inputs), map(arb, rates), map(arb, accelerations), strict=True)]
+    equations: ExactConstraints
+    given: Any = closure
+    if isinstance(closure, PlanarClosure):
+        equations = _PlanarConstraints(closure, driven)
+    else:
+        from linkage_ros.tools.study.spatial_enclosure import (
+            SpatialConstraints,  # local import: in space only
+        )
+
+        equations = SpatialConstraints(given, driven)
+    more = len(equations.constraints) - equations.count
+    if more:
+        reason = f'{abs(more)} constraints {"more" if more > 0 else "less"} than unknowns'
+        raise SingularError(f'{reason}: the exact joints do not exist')
+    return equations
+
+
+class _PlanarConstraints(ExactConstraints):
+    """The constraints of a planar linkage."""
+
+    def __init__(self, closure: PlanarClosure, driven: Sequence[tuple[Any, Any, Any]]) -> None:
+        self._linkage = linkage = closure.linkage
         moving = [name for name in linkage.links if name != GROUND]
         self._links = {name: 1 + 4 * k for k, name in enumerate(moving)}
         self.count = 4 * len(moving)
         unit = max(abs(complex(*z)) for points in linkage.links.values() for z in points.values())
         self.scale = 2.0 ** frexp(unit)[1]
-        self.constraints: list[list[Term]] = []
+        self.constraints = []
         for k in self._links.values():
             along = self._direction_form(k, 1)
-            self.constraints.append([*_dot_product(along, along), _constant_term(-1, 0, 0)])
+            self.constraints.append([*_dot_product(along, along), constant_term(-1, 0, 0)])
         carriers: dict[str, str] = {}
         for link, points in linkage.links.items():
             for point in points:
@@ -141,8 +161,7 @@ class _ExactConstraints:
                 self.constraints.append(
                     _cross_product(turned, self._link_direction(slider.block, acb(1)))
                 )
-        for joint, (value, rate, change) in zip(linkage.inputs, driven, strict=True):
-            x, v, a = arb(value), arb(rate), arb(change)
+        for joint, (x, v, a) in zip(linkage.inputs, driven, strict=True):
             if joint.slider:
                 given = (-x / self.scale, -v / self.scale, -a / self.scale)
                 self.constraints.append([*self._slides[joint.slider], (given, 0, 0)])
@@ -158,7 +177,6 @@ class _ExactConstraints:
             )
 
     def initial_unknowns(self, closure: PlanarClosure, inputs: Sequence[float]) -> list[Any]:
-        """Return the unknowns from the closure's solution; unknown 0 is 1."""
         position = closure.position(*inputs)
         if not position.joints:
             raise ValueError(f'{inputs}: the linkage is {position.status.name.lower()}')
@@ -171,39 +189,11 @@ class _ExactConstraints:
             unknowns += [arb(x) for x in (direction.real, direction.imag, place.real, place.imag)]
         return unknowns
 
-    def compute_residuals(self, motion: Sequence[Sequence[Any]]) -> list[Any]:
-        """Return the residuals, differentiated as often as the motion has derivatives."""
-        return [_evaluate_terms(terms, motion) for terms in self.constraints]
-
-    def compute_jacobian(self, x: Sequence[Any]) -> Any:
-        """Return the derivatives of the constraints with respect to the unknowns."""
-        rows = [[arb(0)] * (self.count + 1) for _ in self.constraints]
-        for row, terms in zip(rows, self.constraints, strict=True):
-            for (factor, *_), i, j in terms:
-                row[i] += factor * x[j]
-                row[j] += factor * x[i]
-        return arb_mat([row[1:] for row in rows])
-
-    def prove_joints(self, x: Sequence[Any]) -> Proof:
-        """Return the published joints and their derivatives."""
-        slopes, motion = self.compute_jacobian(x), [list(x)]
-        for _ in range(2):
-            motion.append([arb(0)] * len(x))
-            rest = self.compute_residuals(motion)
-            try:
-                solved = slopes.solve(arb_mat([[-value] for value in rest]))
-            except ZeroDivisionError:
-                raise SingularError('the balls hold a singular matrix') from None
-            motion[-1] = [arb(0), *solved.entries()]
-        ends = (1, 2, 3)
-        return Proof(*(self.joint_values(*motion[:end]) for end in ends))
-
     def joint_values(self, *motion: Sequence[Any]) -> tuple[Any, ...]:
-        """Return the published joints; with derivatives of the unknowns, the last of them."""
         return tuple(
             self._joint_angle(joint, motion)
             if isinstance(joint, RevoluteJoint)
-            else _evaluate_terms(self._slides[joint.slider], motion) * self.scale
+            else evaluate_terms(self._slides[joint.slider], motion) * self.scale
             for joint in self._linkage.joints.values()
         )
 
@@ -229,8 +219,8 @@ class _ExactConstraints:
 
     def _add_pin(self, one: Form, other: Form) -> None:
         between = _subtract_forms(one, other)
-        self.constraints.append([_constant_term(c.real, 0, k) for k, c in between])
-        self.constraints.append([_constant_term(c.imag, 0, k) for k, c in between])
+        self.constraints.append([constant_term(c.real, 0, k) for k, c in between])
+        self.constraints.append([constant_term(c.imag, 0, k) for k, c in between])
 
     def _point_form(self, link: str, point: str) -> Form:
         z = acb(*self._linkage.links[link][point]) / arb(self.scale)
@@ -247,7 +237,7 @@ class _ExactConstraints:
         return [(k, acb(z)), (k + 1, acb(0, 1) * z)]
 
 
-def _iterate_newton(equations: _ExactConstraints, start: list[Any]) -> list[Any] | None:
+def _iterate_newton(equations: ExactConstraints, start: list[Any]) -> list[Any] | None:
     """Return the unknowns to the present precision, or None where their matrix is singular."""
     x, enough = start, max(2.0 ** (-2 * _RADIUS), 2.0 ** (8 - ctx.prec))
     try:
@@ -263,7 +253,7 @@ def _iterate_newton(equations: _ExactConstraints, start: list[Any]) -> list[Any]
     return x
 
 
-def _prove_solution(equations: _ExactConstraints, start: list[Any]) -> list[Any] | None:
+def _prove_solution(equations: ExactConstraints, start: list[Any]) -> list[Any] | None:
     """Return balls that hold exactly one solution, or None."""
     x = _iterate_newton(equations, start)
     if x is None:
@@ -292,33 +282,14 @@ def _prove_solution(equations: _ExactConstraints, start: list[Any]) -> list[Any]
     return None
 
 
-def _evaluate_terms(terms: Sequence[Term], motion: Sequence[Sequence[Any]]) -> Any:
-    """Return a sum of products; for a motion its highest derivative, by the product rule."""
-    x = motion[0]
-    total = arb(0)
-    for (c, c1, c2), i, j in terms:
-        if len(motion) == 1:
-            total += c * x[i] * x[j]
-            continue
-        v = motion[1]
-        swept = v[i] * x[j] + x[i] * v[j]
-        if len(motion) == 2:
-            total += c1 * x[i] * x[j] + c * swept
-            continue
-        a = motion[2]
-        pulled = a[i] * x[j] + 2 * v[i] * v[j] + x[i] * a[j]
-        total += c2 * x[i] * x[j] + 2 * c1 * swept + c * pulled
-    return total
-
-
 def _dot_product(one: Form, other: Form) -> list[Term]:
-    return [_constant_term((_conjugate(c) * d).real, i, j) for i, c in one for j, d in other]
+    return [constant_term((_conjugate(c) * d).real, i, j) for i, c in one for j, d in other]
 
 
 def _cross_product(one: Form, other: Form, turn: Sequence[Any] = ()) -> list[Term]:
     """Return one × other, with the first rotated by the series of a unit vector."""
     if not turn:
-        return [_constant_term((_conjugate(c) * d).imag, i, j) for i, c in one for j, d in other]
+        return [constant_term((_conjugate(c) * d).imag, i, j) for i, c in one for j, d in other]
     return [
         (tuple((_conjugate(c * t) * d).imag for t in turn), i, j) for i, c in one for j, d in other
     ]
@@ -326,10 +297,6 @@ def _cross_product(one: Form, other: Form, turn: Sequence[Any] = ()) -> list[Ter
 
 def _subtract_forms(one: Form, other: Form) -> Form:
     return [*one, *((k, -c) for k, c in other)]
-
-
-def _constant_term(factor: Any, i: int, j: int) -> Term:
-    return (arb(factor), arb(0), arb(0)), i, j
 
 
 def _complex_cross(one: Any, other: Any) -> Any:

@@ -18,7 +18,6 @@ from time import process_time
 
 from linkage_ros.description import Scene
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics import SpaceClosure
 from linkage_ros.messages import NANOSECONDS
 from linkage_ros.tick import Pipeline
 from linkage_ros.tools.study.age import measure_age_in_use, measure_age_of_command
@@ -160,15 +159,14 @@ def _measure_errors(
         of = f' of {motion.scene_linkage.name}' if motion.scene_linkage.name else ''
         knobs.append(knob._replace(name=knob.name + of))
     progress(0.5)
-    if any(isinstance(motion.closure, SpaceClosure) for motion in motions):
-        left_out.append('solving: the reference lies in the plane')
-    elif any(motion.closure.linkage.ratios for motion in motions):
-        left_out.append('solving: the reference knows no ratios')
-    else:
-        from linkage_ros.tools.study.solving import (
-            measure_solving,  # local import: optional dependencies
-        )
+    from linkage_ros.tools.study.solving import (
+        measure_solving,  # local import: optional dependencies
+        unproved_reason,
+    )
 
+    unproved = [*filter(None, (unproved_reason(motion.closure) for motion in motions))]
+    left_out += [f'solving: {reason}' for reason in dict.fromkeys(unproved)]
+    if not unproved:
         seconds = 1.0 if quick else 8.0
         knobs.append(measure_solving(motions, rate, horizon, quick=quick, seconds=seconds))
     progress(0.7)

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 from linkage_ros.description import SceneLinkage
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure
-from linkage_ros.messages import EffortCommand, NANOSECONDS
+from linkage_ros.messages import EffortsCommand, NANOSECONDS
 from linkage_ros.stages.drives import Context, CrankState, TorqueCrank, TorqueDrive
 
 BEGIN = NANOSECONDS
@@ -43,10 +43,10 @@ Path = Callable[[int], Crank | None]
 
 
 class Command(NamedTuple):
-    """A command of a torque drive, in the unit that it takes."""
+    """Commands of a torque drive, in the units that it takes."""
 
     time: int  # Arrival after the first tick, in [ns]
-    effort: float
+    efforts: tuple[float | None, ...]  # Of each input; None for one without a command
 
 
 class LinkageMotion(NamedTuple):
@@ -85,8 +85,8 @@ def cranks_at(motion: LinkageMotion, times: Sequence[int], **changes: Any) -> li
         # A drive that is asked too seldom leaves time out, and a runaway is to be seen early.
         for stop in (*range(passed - passed % look + look, time, look), time):
             while number < len(commands) and commands[number].time <= stop:
-                arrival, effort = commands[number]
-                drive.offer(EffortCommand(0, effort), BEGIN + arrival)
+                arrival, efforts = commands[number]
+                drive.offer(EffortsCommand(0, efforts), BEGIN + arrival)
                 number += 1
             crank = drive.state(BEGIN + stop)
             _check_bounded(crank, stop, step)
@@ -137,7 +137,7 @@ def refuse_horizon(time: float, why: str) -> LinkageError:
 
 def _check_bounded(crank: CrankState, time: int, step: float) -> None:
     """Refuse a rate that is too fast for the step."""
-    passed = abs(crank.rates[0]) * step
+    passed = max(map(abs, crank.rates)) * step
     if not passed <= _BEYOND:
         why = f'the input runs away and passes {passed:.2g} rad in a step'
         raise refuse_horizon(time * 1e-9, why)

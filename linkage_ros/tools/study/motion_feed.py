@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 from linkage_ros.description import Scene
 from linkage_ros.messages import JointStateWriter
@@ -69,7 +70,7 @@ def _commands_and_ticks(
     zeros = (0.0,) * len(names)
     period = 1e9 / scene.rate
     number, next_ones = 0, [0] * len(driven)
-    efforts = [0.0] * len(driven)
+    newest = [[0.0] * len(each.context.inputs_in_messages) for each in driven]
     while True:
         elapsed = round(number * period)
         fresh = False
@@ -77,8 +78,10 @@ def _commands_and_ticks(
             while next_ones[k] < len(each.commands) and (
                 each.commands[next_ones[k]].time <= elapsed
             ):
-                efforts[k] = each.commands[next_ones[k]].effort
+                commanded = zip(each.commands[next_ones[k]].efforts, newest[k], strict=True)
+                newest[k] = [old if new is None else new for new, old in commanded]
                 next_ones[k] += 1
                 fresh = True
+        efforts = [*chain(*newest)]
         yield BEGIN + elapsed, write(BEGIN, zeros, zeros, efforts) if fresh else b''
         number += 1

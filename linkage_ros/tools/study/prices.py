@@ -30,7 +30,7 @@ from time import perf_counter
 
 from linkage_ros.description import parse_scene, Scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics import Closure, InputSweep, usual_inputs
+from linkage_ros.kinematics import Closure, InputSweep, Status, usual_inputs
 from linkage_ros.messages import JointStateWriter
 from linkage_ros.stages.drives import ExchangedInputs
 from linkage_ros.tick import LinkagePipeline, Pipeline
@@ -45,7 +45,13 @@ _CRANK_RATE = 1.0
 """Turns, or oscillations, of the crank per second."""
 
 _PART = 0.4
-"""Amplitude of a crank that does not turn fully, as a fraction of its range."""
+"""
+Amplitude of a crank that does not turn fully, as a fraction of its range; of several inputs the
+greatest one, in [rad] or sizes of the linkage.
+"""
+
+_LEAST_PART, _PLACES = 0.01, 32
+"""The least amplitude of several inputs, and the places where it is tried that they close."""
 
 _BLOCK = 100
 """Ticks of a block: enough to warm the caches, few compared with a drift of the machine."""
@@ -129,18 +135,43 @@ def _input_paths(linkage: LinkagePipeline) -> list[Path]:
 
 
 def swinging_inputs(closure: Closure, frequency: float) -> list[Path]:
-    """Return sines of all inputs, at a frequency in [Hz], within the range where they close."""
+    """
+    Return sines of all inputs within the range where they close.
+
+    The first has a frequency in [Hz]; those of others are lower, so that they meet all the others.
+    """
     centers = usual_inputs(closure)
-    sizes = [0.01 * (closure.scale if each.slider else 1.0) for each in closure.linkage.inputs]
-    if len(centers) == 1:
+    if len(centers) > 1:
+        sizes = _closing_sizes(closure, centers)
+    else:
         widest = InputSweep(closure).widest_range
         assert widest is not None, 'reading the file has proved that it closes somewhere'
         sizes = [pi]
         if not widest.is_whole:
             centers = (0.5 * (widest.lowest + widest.highest),)
             sizes = [min(pi, _PART * (widest.highest - widest.lowest))]
-    speed = tau * frequency
-    return [_oscillation_path(c, size, speed) for c, size in zip(centers, sizes, strict=True)]
+    return [
+        _oscillation_path(center, size, tau * frequency / (1.0 + 0.25 * k))
+        for k, (center, size) in enumerate(zip(centers, sizes, strict=True))
+    ]
+
+
+def _closing_sizes(closure: Closure, centers: Sequence[float]) -> list[float]:
+    """Return how far several inputs may go together from where they are, to both sides."""
+    units = [closure.scale if each.slider else 1.0 for each in closure.linkage.inputs]
+    random = Random(0)
+    parts = [[random.uniform(-1.0, 1.0) for _ in units] for _ in range(_PLACES)]
+    size = _PART
+    while size > _LEAST_PART:
+        places = (
+            [c + size * unit * part for c, unit, part in zip(centers, units, one, strict=True)]
+            for one in parts
+        )
+        if all(closure.position(*place).status is Status.CLOSED for place in places):
+            break
+        size *= 0.5
+    # Beside the places may be others that do not close.
+    return [0.8 * size * unit for unit in units]
 
 
 def _oscillation_path(center: float, amplitude: float, speed: float) -> Path:

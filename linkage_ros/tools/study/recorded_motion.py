@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from linkage_ros.bag import Bag, read_raw_metadata
@@ -135,13 +136,16 @@ def follow_commands(motion: LinkageMotion, bag: Bag) -> LinkageMotion:
         end = log_time if end is None else max(end, log_time)
         if name in of_type and (name == topic or not topic):
             command = read(data)
-            if not isinstance(command, Rejection) and abs(command.effort) <= LARGEST:
-                heard.setdefault(name, []).append(Command(log_time, command.effort))
+            if isinstance(command, Rejection):
+                continue
+            if all(abs(effort) <= LARGEST for effort in command.efforts if effort is not None):
+                heard.setdefault(name, []).append(Command(log_time, command.efforts))
     if begin is None or end is None or end == begin:
         raise BagError(bag.path, 'holds no run', 'name another bag')
     most = max(heard.values(), key=len, default=[])
+    most.sort(key=attrgetter('time'))
     return motion._replace(
-        commands=[each._replace(time=each.time - begin) for each in sorted(most)],
+        commands=[each._replace(time=each.time - begin) for each in most],
         length=(end - begin) * 1e-9,
         note=f'{len(most) or "no"} commands come, as recorded in {bag.path.name}',
     )

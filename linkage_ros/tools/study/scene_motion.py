@@ -11,16 +11,19 @@ The motion that a scene makes.
 
 A drive that computes its crank is asked itself. A `topic` drive has no motion of its own: it is
 said what its crank does, by a sine or by the samples of a bag. To a `torque` drive commands come:
-those of a bag, or a sine of effort; without either it moves by its start, weight and loads alone.
+those of a bag, or a sine of effort for each input, of frequencies that differ; without either it
+moves by its start, weight and loads alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 from math import sin, tau
+from typing import Any
 
 from linkage_ros.bag import Bag, read_bag
 from linkage_ros.description import Scene
+from linkage_ros.errors import list_names
 from linkage_ros.kinematics import Closure
 from linkage_ros.messages import NANOSECONDS
 from linkage_ros.stages.drives import CrankState
@@ -41,6 +44,9 @@ SINE = 'sine'
 
 COMMAND_PERIOD = 0.05
 """Longest time between two commands of a torque drive, in [s]."""
+
+_COMMANDED = 0.5
+"""Of the sine of the first input's commands, in [Hz]; those of others are slower."""
 
 _FREQUENCY = 0.5
 """Of the sine of a crank, in [Hz]: one that turns makes 1.6 turns a second at most."""
@@ -85,13 +91,6 @@ def _linkage_motion(
     motion = LinkageMotion(scene_linkage, linkage.closure, context, None)
     _, drive = scene_linkage.drive
     if drive.gives_torque:
-        count = len(linkage.closure.input_names)
-        if count > 1:
-            raise scene_linkage.content.error(
-                'drive',
-                f'torque moves {count} inputs, and its accuracy is measured for one',
-                'name a scene that moves them otherwise, or one with one input',
-            )
         return _commanded_motion(motion, like, bag, horizon)
     if drive.reads_bag:
         opened = read_bag(drive.file, allow_truncated=drive.allow_truncated)
@@ -145,18 +144,23 @@ def _commanded_motion(
         return follow_commands(motion, bag)
     if like is None and moves_without_commands(motion, horizon):
         return motion._replace(note='no command comes')
-    effort = _usual_effort(motion)
-    timeout = motion.scene_linkage.drive[1].timeout
-    period = round(min(COMMAND_PERIOD, 0.5 * timeout) * NANOSECONDS)
+    use, inputs = motion.scene_linkage.drive[1], motion.closure.linkage.inputs
+    uses = [use.for_input(given.joint) for given in inputs]
+    needed = [_needed_effort(motion)] if len(inputs) == 1 else _needed_efforts(motion)
+    period = round(min(COMMAND_PERIOD, 0.5 * use.timeout) * NANOSECONDS)
+    sines, said = [], []
+    for k, (given, own, effort) in enumerate(zip(inputs, uses, needed, strict=True)):
+        unit = motion.closure.scale if given.slider else 1.0
+        size, hertz = _commanded_size(own.motor, effort, unit), _COMMANDED / (1.0 + 0.25 * k)
+        sines.append((size, tau * hertz))
+        units = {'effort': 'N' if given.slider else 'N·m', 'current': 'A', 'voltage': 'V'}
+        unit_name = units[own.motor.command if own.motor else 'effort']
+        said.append(f'a sine of {hertz:.3g} Hz and {size:.3g} {unit_name}')
     commands = [
-        Command(time, effort * sin(0.5 * tau * time * 1e-9))
+        Command(time, tuple(size * sin(speed * time * 1e-9) for size, speed in sines))
         for time in range(period, round(horizon * NANOSECONDS), period)
     ]
-    motor = motion.scene_linkage.drive[1].motor
-    slides = motion.closure.linkage.inputs[0].slider
-    units = {'effort': 'N' if slides else 'N·m', 'current': 'A', 'voltage': 'V'}
-    unit = units[motor.command if motor else 'effort']
-    note = f'commands are a sine of 0.5 Hz and {effort:.3g} {unit}, {1e9 / period:g} a second'
+    note = f'commands are {list_names(said)}, {1e9 / period:g} a second'
     if like is None:
         note += ', since nothing moves without'
     return motion._replace(commands=commands, note=note)
@@ -165,19 +169,35 @@ def _commanded_motion(
 def moves_without_commands(motion: LinkageMotion, horizon: float) -> bool:
     """Return whether a torque drive moves without commands."""
     drive = build_drive(motion)
-    begin = drive.state(BEGIN).angles[0]
+    begin = drive.state(BEGIN).angles
     for index in range(1, 2 + int(horizon / _LOOK)):
         time = BEGIN + round(index * _LOOK * NANOSECONDS)
-        if abs(drive.state(time).angles[0] - begin) > _STANDS:
+        moved = zip(drive.state(time).angles, begin, strict=True)
+        if max(abs(now - then) for now, then in moved) > _STANDS:
             return True
     return False
 
 
-def _usual_effort(motion: LinkageMotion) -> float:
-    """Return the amplitude of the commands: they pass friction and a fifth of the weight."""
+def _needed_efforts(motion: LinkageMotion) -> list[float]:
+    """Return efforts of several inputs as `_needed_effort`, by what is needed at the start."""
+    terms = build_drive(motion).motion
+    terms = getattr(terms, 'moved', terms).terms
+    mechanics, inputs = motion.context.mechanics, motion.closure.linkage.inputs
+    found = []
+    for k, given in enumerate(inputs):
+        rubbing = zip(terms.slips, mechanics.dry_frictions, strict=True)
+        friction = sum(abs(slip.levers[k]) * of.holding for slip, of in rubbing)
+        unit = motion.closure.scale if given.slider else 1.0
+        inertia = 1.0 / terms.mobility[k][k]
+        found.append(friction + 0.2 * abs(terms.bias[k]) + 2.0 * unit * inertia)
+    return found
+
+
+def _needed_effort(motion: LinkageMotion) -> float:
+    """Return the amplitude of efforts that pass friction and a fifth of the weight."""
     equation = motion.context.mechanics.motion_equation
     drive = build_drive(motion)
-    start = motion.scene_linkage.drive[1].start
+    start = motion.scene_linkage.drive[1].for_input(motion.closure.input_names[0]).start
     low, high = (
         min(max(end, start - tau), start + tau) for end in drive.actuation_for(None)[0].stops
     )
@@ -186,8 +206,11 @@ def _usual_effort(motion: LinkageMotion) -> float:
     friction = max(terms.coulomb + terms.breakaway for terms in found)
     weight = max(abs(terms.potential_slope) for terms in found)
     unit = motion.closure.scale if motion.closure.linkage.inputs[0].slider else 1.0
-    effort = friction + 0.2 * weight + 2.0 * unit * least
-    motor = motion.scene_linkage.drive[1].motor
+    return friction + 0.2 * weight + 2.0 * unit * least
+
+
+def _commanded_size(motor: Any, effort: float, unit: float) -> float:
+    """Return the command under which a motor gives an effort; ``unit`` is the rate of 1."""
     if motor is None or motor.command == 'effort':
         return effort
     current: float = effort / (motor.torque_constant * motor.ratio * motor.efficiency)

@@ -12,7 +12,8 @@ The error of solving the loops, and what other ways to solve them cost.
 The exact joints are from `linkage_ros.tools.study.enclosure`: balls that are proved to hold
 the solution. The states are from the scene's own motion. What a scene cannot ask for stands
 beside the closed form for comparison: numbers of 32 bits, the textbook form, Newton's method, a
-spline through a table, thirty digits.
+spline through a table, thirty digits; and of links that close only together the steps of Newton's
+method, and the size of the cells that these start from.
 """
 
 from __future__ import annotations
@@ -20,17 +21,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
 from math import inf, sqrt
+from time import process_time
 from typing import Any, NamedTuple
 
 from linkage_ros.description import read_linkage, read_yaml
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.kinematics import (
+    Closure,
     InputSweep,
     is_iterated,
-    Linkage,
     PlanarClosure,
-    RevoluteJoint,
     Status,
+    usual_inputs,
 )
 from linkage_ros.resources import shipped_path
 from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
@@ -54,6 +56,12 @@ CLOSED_FORM, ITERATED = 'closed form', 'iterated'
 _STATES, _QUICK_STATES = 48, 12
 _TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
 _KNOTS = (64, 1024, 16_384)
+_ITERATIONS = ((1, 0), (1, 2), (2, 0), (2, 2), (3, 0))
+"""Steps of Newton's method, and how often the cells are halved that they start from."""
+
+_QUICK_COMPARED = 3.0
+"""Time after which a quick measurement looks at no further method, in [s]."""
+
 _BITS = 104
 """Precision of thirty digits."""
 
@@ -93,31 +101,34 @@ def measure_solving(
     motion.
     """
     check_installed('flint')
+    begun, left_out = process_time(), []
     count = _QUICK_STATES if quick else _STATES
     times = draw_times(horizon, count)
     errors: list[JointError] = []
     candidates: list[tuple[str, JointError, Candidate]] = []
     unproved = 0
     for index, motion in enumerate(motions):
-        closure: Any = motion.closure  # planar: solving is measured in the plane alone
-        linkage = closure.linkage
+        closure = motion.closure
         states = [
             crank[0]
             for crank in cranks_at(motion, times)
             if crank is not None and motion.closure.position(*crank[0]).joints
         ]
-        known, exact = exact_joints(linkage, states)
+        known, exact = exact_joints(closure, states)
         unproved += len(states) - len(known)
         if not known:
             continue
         own = _scene_solver(closure)
-        errors.append(compare_solver(linkage, own.solve, known, exact)[0])
+        errors.append(compare_solver(closure, own.solve, known, exact)[0])
         progress(0.2)
         if index:
             continue
         candidates.append((own.label, errors[0], _timed_candidate(own.solve, known)))
         for solver in comparison_solvers(closure):
-            error, failed = compare_solver(linkage, solver.solve, known, exact)
+            if quick and process_time() - begun > _QUICK_COMPARED:
+                left_out.append('other methods are left out for lack of time')
+                break
+            error, failed = compare_solver(closure, solver.solve, known, exact)
             if not failed:
                 candidates.append((solver.label, error, _timed_candidate(solver.solve, known)))
     if not candidates:
@@ -135,24 +146,44 @@ def measure_solving(
         for (label, error, _), spread in zip(candidates, times_of, strict=True)
     ]
     settings[0] = settings[0]._replace(error=worst, changes=())
-    note = f'{unproved} states too near a toggle or change point to be proved' if unproved else ''
-    return Knob(NAME, settings, 0, note=note)
+    if unproved:
+        left_out.append(f'{unproved} states too near a toggle or change point to be proved')
+    return Knob(NAME, settings, 0, note='; '.join(left_out))
+
+
+def unproved_reason(closure: Closure) -> str:
+    """Return why nothing can be proved of a linkage in any state; '' if it can."""
+    check_installed('flint')
+    from linkage_ros.tools.study.enclosure import (
+        constraints_of,  # local import: an optional dependency
+    )
+    from linkage_ros.tools.study.exact_constraints import (
+        SingularError,  # local import: an optional dependency
+    )
+
+    if closure.linkage.ratios:
+        return 'the reference knows no ratios'
+    try:
+        constraints_of(closure, usual_inputs(closure))
+    except SingularError as error:
+        return str(error)
+    return ''
 
 
 def exact_joints(
-    linkage: Linkage, states: Sequence[Sequence[float]]
+    closure: Closure, states: Sequence[Sequence[float]]
 ) -> tuple[list[Sequence[float]], list[Sequence[Any]]]:
     """Return the states at which joints can be proved, and their balls."""
-    from linkage_ros.tools.study.enclosure import (
-        prove,  # local import: an optional dependency
-        SingularError,
+    from linkage_ros.tools.study.enclosure import prove  # local import: an optional dependency
+    from linkage_ros.tools.study.exact_constraints import (
+        SingularError,  # local import: an optional dependency
     )
 
     known: list[Sequence[float]] = []
     exact: list[Sequence[Any]] = []
     for state in states:
         try:
-            proof = prove(linkage, state)
+            proof = prove(closure, state)
         except (SingularError, ValueError):
             continue
         known.append(state)
@@ -161,7 +192,7 @@ def exact_joints(
 
 
 def compare_solver(
-    linkage: Linkage,
+    closure: Closure,
     solve: Solve,
     states: Sequence[Sequence[float]],
     exact: Sequence[Sequence[Any]],
@@ -172,7 +203,7 @@ def compare_solver(
     found: list[float] = []
     for state, balls, limit in zip(states, exact, limits, strict=True):
         joints = solve(*state)
-        error = largest_distance(linkage, joints, balls) if len(joints) else inf
+        error = largest_distance(closure, joints, balls) if len(joints) else inf
         if error <= limit:
             found.append(error)
     if not found:
@@ -181,27 +212,27 @@ def compare_solver(
     return JointError(rms, max(found)), len(states) - len(found)
 
 
-def largest_distance(linkage: Linkage, joints: Sequence[Any], balls: Sequence[Any]) -> float:
+def largest_distance(closure: Closure, joints: Sequence[Any], balls: Sequence[Any]) -> float:
     """Return the greatest distance of joints from balls, slides in parts of the size."""
     from flint import arb, ctx  # local import: an optional dependency
 
     before, ctx.prec = ctx.prec, 512
     try:
         worst = 0.0
-        for joint, value, ball in zip(linkage.joints.values(), joints, balls, strict=True):
+        for turning, value, ball in zip(closure.turning, joints, balls, strict=True):
             apart = (value if isinstance(value, arb) else arb(float(value))) - ball
-            if isinstance(joint, RevoluteJoint):
+            if turning:
                 turn = 2 * arb.pi()
                 apart -= turn * round(float((apart / turn).mid()))
                 worst = max(worst, abs(float(apart.mid())))
             else:
-                worst = max(worst, abs(float(apart.mid())) / size_of(linkage))
+                worst = max(worst, abs(float(apart.mid())) / size_of(closure.linkage))
     finally:
         ctx.prec = before
     return worst
 
 
-def _scene_solver(closure: PlanarClosure) -> SolvingMethod:
+def _scene_solver(closure: Closure) -> SolvingMethod:
     """Return what a scene solves with, as a tick does."""
     compiled = closure.compile_linkage(0)
     fast, plain = compiled.fast, compiled.run_interpreted
@@ -213,38 +244,53 @@ def _scene_solver(closure: PlanarClosure) -> SolvingMethod:
     return SolvingMethod(ITERATED if is_iterated(closure) else CLOSED_FORM, position)
 
 
-def comparison_solvers(closure: PlanarClosure) -> Iterator[SolvingMethod]:
+def comparison_solvers(closure: Closure) -> Iterator[SolvingMethod]:
     """Yield ways to solve a linkage which no scene can ask for."""
     linkage = closure.linkage
-    shape = plain_four_bar(linkage)
+    shape = plain_four_bar(linkage) if isinstance(closure, PlanarClosure) else None
     if shape is not None:
         yield SolvingMethod('float32', solve_in_single_precision(shape))
         yield SolvingMethod('textbook form', solve_by_textbook(shape))
+    for steps, halvings in _ITERATIONS if is_iterated(closure) else ():
+        yield _iterated_solver(closure, steps, halvings)
     for tolerance in _TOLERANCES:
         yield SolvingMethod(
-            f'Newton to {error_text(tolerance)}', solve_by_newton(linkage, tolerance)
+            f'Newton to {error_text(tolerance)}', solve_by_newton(closure, tolerance)
         )
     if len(linkage.inputs) == 1 and find_spec('scipy') is not None:
         for knots in _KNOTS:
             spline = _solve_by_spline(closure, knots)
             if spline is not None:
                 yield SolvingMethod(f'spline, {knots:,} knots', spline)
-    yield SolvingMethod('30 digits', _solve_to_digits(linkage))
+    yield SolvingMethod('30 digits', _solve_to_digits(closure))
 
 
-def _solve_to_digits(linkage: Linkage) -> Solve:
-    from linkage_ros.tools.study import enclosure  # local import: an optional dependency
+def _iterated_solver(closure: Closure, steps: int, halvings: int) -> SolvingMethod:
+    """Return what a scene solves with, but by so many steps from cells halved so often."""
+    changed = type(closure)(closure.linkage)
+    for step in changed.steps:
+        step.iterate_by(steps, halvings)
+    label = f'{ITERATED}, {steps} step{"s" * (steps > 1)}'
+    label += f' from cells 1/{2**halvings} as wide' if halvings else ''
+    return SolvingMethod(label, _scene_solver(changed).solve)
+
+
+def _solve_to_digits(closure: Closure) -> Solve:
+    from linkage_ros.tools.study.enclosure import solve  # local import: an optional dependency
+    from linkage_ros.tools.study.exact_constraints import (
+        SingularError,  # local import: an optional dependency
+    )
 
     def position(*inputs: float) -> Sequence[Any]:
         try:
-            return enclosure.solve(linkage, inputs, _BITS)
-        except (enclosure.SingularError, ValueError):
+            return solve(closure, inputs, _BITS)
+        except (SingularError, ValueError):
             return ()
 
     return position
 
 
-def _solve_by_spline(closure: PlanarClosure, knots: int) -> Solve | None:
+def _solve_by_spline(closure: Closure, knots: int) -> Solve | None:
     """Return a cubic spline through states over the widest range; None if it does not close."""
     from scipy.interpolate import CubicSpline  # local import: an optional dependency
 
@@ -258,8 +304,8 @@ def _solve_by_spline(closure: PlanarClosure, knots: int) -> Solve | None:
     joints = closure.solve(places, derivatives=0).positions
     if not np.all(np.isfinite(joints)):
         return None
-    for row, joint in zip(joints, closure.linkage.joints.values(), strict=True):
-        if isinstance(joint, RevoluteJoint):
+    for row, turning in zip(joints, closure.turning, strict=True):
+        if turning:
             row[:] = np.unwrap(row)
     spline = CubicSpline(places, joints.T)
     whole = interval.is_whole
@@ -303,15 +349,15 @@ def compare_hard_cases() -> Iterator[HardCase]:
         ('double_rocker', 'toggle', _near_toggle),
         ('parallelogram', 'change point', _near_change_point),
     ):
-        linkage = read_linkage(read_yaml(shipped_path(f'linkages/{name}.yaml'))[0])
-        closure = PlanarClosure(linkage)
+        content, _ = read_yaml(shipped_path(f'linkages/{name}.yaml'))
+        closure = PlanarClosure(read_linkage(content))
         states, distances = near(closure)
-        known, exact = exact_joints(linkage, states)
+        known, exact = exact_joints(closure, states)
         # Next to a change point the other assembly is as near as the change point itself.
         limits = [0.1 * distances[states.index(tuple(state))] for state in known]
         far = limits if place == 'change point' else None
         for solver in (_scene_solver(closure), *comparison_solvers(closure)):
-            error, failed = compare_solver(linkage, solver.solve, known, exact, far)
+            error, failed = compare_solver(closure, solver.solve, known, exact, far)
             yield HardCase(f'{place} of {name}', solver.label, error.worst, failed, len(known))
 
 

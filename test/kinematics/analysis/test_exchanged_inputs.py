@@ -109,7 +109,7 @@ def test_exact_crank_angle_lies_within_the_error_bound(name):
                     if not branch.least < place < branch.most:
                         break  # The exact crank cannot be beyond the end.
                     try:
-                        at = prove(closure.linkage, [place])
+                        at = prove(closure, [place])
                     except (SingularError, ValueError):
                         break
                     off = float((at.joints[number] - arb(y)).mid())
@@ -130,7 +130,7 @@ def test_inverse_crank_rates_give_the_requested_joint_rates(name):
                 velocity = inverse.velocity(position, 0.7)
                 acceleration = inverse.acceleration(position, velocity, -1.3)
                 truth = prove(
-                    closure.linkage,
+                    closure,
                     [position.joints[0]],
                     [velocity.joints[0]],
                     [acceleration.joints[0]],

@@ -47,10 +47,10 @@ def run_scene(scene, ticks, messages=()):
             )
 
 
-def command_messages(commands, joint='crank_joint'):
+def command_messages(commands, *joints):
     """Return the messages of commands, by their times in [ns]."""
-    write = JointStateWriter([joint]).write
-    return [(each.time, write(BEGIN, (0.0,), (0.0,), (each.effort,))) for each in commands]
+    write, zeros = JointStateWriter([*joints]).write, (0.0,) * len(joints)
+    return [(each.time, write(BEGIN, zeros, zeros, each.efforts)) for each in commands]
 
 
 A, B, C, D = 0.040, 0.120, 0.080, 0.100

@@ -14,9 +14,11 @@ from math import gcd, remainder, tau
 import os
 import random
 
+from linkage_ros import load
 from linkage_ros.description import load_scene
 from linkage_ros.kinematics import SpaceLinkage
 from linkage_ros.messages import JointStateWriter
+from linkage_ros.resources import shipped_path
 from linkage_ros.tools.study import (
     draw_ticks,
     draw_times,
@@ -92,7 +94,7 @@ def scene_of(folder, text, method, limits=''):
 
 
 def commands_of(motion):
-    return [(0.0, 0.0), *((each.time * 1e-9, each.effort) for each in motion.commands)]
+    return [(0.0, 0.0), *((each.time * 1e-9, *each.efforts) for each in motion.commands)]
 
 
 def falling(motion, times):
@@ -151,33 +153,80 @@ WEIGHED = f"""{RSSR}masses:
 """
 
 
-def test_claimed_spatial_step_error_equals_lagrange_multipliers(tmp_path):
-    """The truth is of Lagrange multipliers in absolute coordinates, by DOP853."""
-    (tmp_path / 'rssr.yaml').write_text(WEIGHED)
-    (tmp_path / 'scene.yaml').write_text(
-        'linkage: rssr.yaml\nrate: 100\nloads: {gravity: [0, 0, -9.81]}\n'
-        'drive: {torque: {start: 0.5, method: semi_implicit_euler, step: 0.002}}\n'
-    )
-    scene, horizon = load_scene(tmp_path / 'scene.yaml'), 0.4
-    (motion,) = motions_of(scene, None, horizon)
-    closure = motion.closure
+ANKLE_MASSES = """masses:
+  bar1: {mass: 0.1, center: [0.035, 0.01, 0.148], inertia: [8.0e-6, 0, 0, 2.0e-6, 0, 8.0e-6]}
+  bar2: {mass: 0.1, center: [0.04, -0.01, 0.213], inertia: [8.0e-6, 0, 0, 2.0e-6, 0, 8.0e-6]}
+  rod1: {mass: 0.06}
+  rod2: {mass: 0.07}
+  cross: {mass: 0}
+  foot: {mass: 0.8, center: [0.03, 0, -0.05], inertia: [5.0e-4, 0, 0, 2.7e-3, 0, 3.1e-3]}
+"""
+DELTA_MASSES = """masses:
+  arm1: {mass: 0.2, center: [150, 0, -75], inertia: [1.0e-4, 0, 0, 5.0e-4, 0, 5.0e-4]}
+  arm2: {mass: 0.2, center: [-75, 130, -75], inertia: [4.0e-4, 0, 0, 2.0e-4, 0, 5.0e-4]}
+  arm3: {mass: 0.2, center: [-75, -130, -75], inertia: [4.0e-4, 0, 0, 2.0e-4, 0, 5.0e-4]}
+  rod1: {mass: 0.05}
+  rod2: {mass: 0.05}
+  rod3: {mass: 0.05}
+  xs: {mass: 0}
+  ys: {mass: 0}
+  platform: {mass: 0.3, center: [0, 0, -500], inertia: [1.0e-4, 0, 0, 1.0e-4, 0, 2.0e-4]}
+"""
+
+
+def shipped_text(name):
+    return shipped_path(f'linkages/space/{name}.yaml').read_text()
+
+
+IN_SPACE = {
+    'rssr': (WEIGHED, [0.5]),
+    'delta': (shipped_text('delta') + DELTA_MASSES, [0.1, -0.1, 0.2]),
+    'ankle': (shipped_text('ankle') + ANKLE_MASSES, [0.1, -0.05]),
+    'ankle_motors': (shipped_text('ankle_motors'), [0.1, 0.05]),
+}
+
+
+def multiplier_motion(closure, start, times):
+    """Return inputs at times by Lagrange multipliers in absolute coordinates, by DOP853."""
+    count = len(start)
 
     def slope(_, state):
-        q, w = state
-        none, one = (
-            AbsoluteMotion(closure, (q,), (w,), (a,)).efforts((0.0, 0.0, -9.81))[0]
-            for a in (0.0, 1.0)
+        q, w = state[:count], state[count:]
+        bare, *columns = (
+            AbsoluteMotion(closure, q, w, changes).efforts((0.0, 0.0, -9.81))
+            for changes in np.vstack([np.zeros(count), np.eye(count)])
         )
-        return w, -none / (one - none)
+        return [*w, *np.linalg.solve((np.array(columns) - bare).T, -bare)]
 
-    ticks = np.arange(41) / 100.0
-    true = solve_ivp(slope, (0.0, horizon), (0.5, 0.0), 'DOP853', ticks, rtol=1e-9, atol=1e-11)
+    begin = [*start, *[0.0] * count]
+    return solve_ivp(slope, (0.0, times[-1]), begin, 'DOP853', times, rtol=1e-6, atol=1e-8).y
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize('name', IN_SPACE)
+def test_claimed_spatial_step_error_equals_lagrange_multipliers(tmp_path, name):
+    """The truth is of Lagrange multipliers in absolute coordinates, by DOP853."""
+    text, start = IN_SPACE[name]
+    (tmp_path / 'linkage.yaml').write_text(text)
+    closure = load(tmp_path / 'linkage.yaml')
+    begins = dict(zip(closure.input_names, start, strict=True))
+    inputs = ', '.join(f'{joint}: {{start: {value}}}' for joint, value in begins.items())
+    (tmp_path / 'scene.yaml').write_text(
+        'linkage: linkage.yaml\nrate: 100\nloads: {gravity: [0, 0, -9.81]}\ndrive: {torque: '
+        f'{{method: semi_implicit_euler, step: 0.002, inputs: {{{inputs}}}}}}}\n'
+    )
+    scene, horizon = load_scene(tmp_path / 'scene.yaml'), 0.04
+    (motion,) = motions_of(scene, None, horizon)
+    closure = motion.closure  # It publishes the inputs, too.
+    true = multiplier_motion(closure, start, np.arange(5) / 100.0)
     claimed = measure_drive_step(motion, 100.0, horizon, quick=True, seconds=0.0)[0]
-    worst = 0.0
-    for (_, joints, _), q in zip(run_scene(scene, 41), true.y[0], strict=True):
-        exact = zip(closure.joint_names, closure.position(q).joints, strict=True)
-        worst = max([worst, *(abs(remainder(joints[name] - value, tau)) for name, value in exact)])
-    assert worst > 1e-5
+    worst, size = 0.0, _size(closure.linkage)
+    for (_, joints, _), values in zip(run_scene(scene, 5), true.T, strict=True):
+        exact = closure.position(*values[: len(start)]).joints
+        for joint, value, turns in zip(closure.joint_names, exact, closure.turning, strict=True):
+            off = joints[joint] - value
+            worst = max(worst, abs(remainder(off, tau)) if turns else abs(off) / size)
+    assert worst > 1e-6
     assert worst / 1.5 <= claimed.own_setting.error.worst <= 1.5 * worst
 
 

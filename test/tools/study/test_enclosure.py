@@ -17,7 +17,7 @@ from campaigns.accuracy.random_families import RANDOM
 from campaigns.accuracy.reference import Outcome, Reference as Elsewhere
 from campaigns.accuracy.run import make
 from flint import ctx
-from linkage_ros.description import read_linkage, read_yaml
+from linkage_ros import load
 from linkage_ros.kinematics import (
     Closure,
     Input,
@@ -25,9 +25,9 @@ from linkage_ros.kinematics import (
     RevoluteJoint,
     SlideJoint,
     Slider,
+    Status,
     usual_inputs,
 )
-from linkage_ros.resources import shipped_path
 from linkage_ros.tools.study import prove, SingularError, solve
 from mpmath import mp, mpf
 import pytest
@@ -40,9 +40,11 @@ from ...kinematics.samples import (
     SLIDER_CRANKS,
 )
 
+IN_SPACE = ['rssr', 'spatial_slider_crank', 'delta', 'ankle', 'ankle_motors', 'wishbone']
 
-def linkage_of(name: str) -> Linkage:
-    return read_linkage(read_yaml(shipped_path(f'linkages/{name}.yaml'))[0])
+
+def closure_of(name: str) -> Closure:
+    return load(name)
 
 
 def number_of(ball: Any) -> mpf:
@@ -77,13 +79,12 @@ def test_interval_enclosures_contain_the_power_series_solutions(family):
     compared = 0
     for index in range(20):
         mechanism, angles, accelerations = make(7, family, index)
-        linkage = mechanism.linkage()
-        closure, elsewhere = Closure(linkage), Elsewhere(mechanism)
+        closure, elsewhere = Closure(mechanism.linkage()), Elsewhere(mechanism)
         for phi, alpha in [*zip(angles, accelerations, strict=True)][::5]:
             expected = elsewhere.solve(phi, alpha)
             if expected.outcome is not Outcome.CLOSED or not closure.position(phi).joints:
                 continue
-            found = prove(linkage, [phi], [1.0], [alpha])
+            found = prove(closure, [phi], [1.0], [alpha])
             for joint, turning in enumerate(closure.turning):
                 unit = 1.0 if turning else 2.0**expected.motion.exponent
                 for order in range(3):
@@ -122,12 +123,11 @@ def test_interval_enclosures_contain_the_reference_loops(loop):
     for *lengths, phi, side in cases(loop.split(', ')[1], 60):
         truth = solve_loop(*lengths, phi, side, digits=120)
         _, *expected = (getattr(truth, field.name) for field in fields(truth))
-        linkage = make_mechanism(tuple(lengths[:count]), side).linkage()
-        closure = Closure(linkage)
+        closure = Closure(make_mechanism(tuple(lengths[:count]), side).linkage())
         if expected[-1] is None or not closure.position(phi).joints:
             continue
         try:
-            found = prove(linkage, [phi])
+            found = prove(closure, [phi])
         except SingularError:
             # Within some 1e-12 of a toggle a double does not tell its two assemblies apart.
             assert max(condition for _, condition in expected) > 1e6
@@ -154,7 +154,7 @@ def test_interval_enclosure_equals_the_worked_slider_crank():
     )
     # A double is not quite 60 degrees: the rates there make up for the rest.
     angle = pi / 3
-    found = prove(linkage, [angle])
+    found = prove(Closure(linkage), [angle])
     with mp.workdps(60):
         rest = mp.pi / 3 - mpf(angle)
         rod, slide = (
@@ -167,7 +167,7 @@ def test_interval_enclosure_equals_the_worked_slider_crank():
 
 @pytest.mark.parametrize('distance', [1e-3, -1e-3, 1e-6, 1e-9, -1e-9, 1e-12])
 def test_interval_enclosure_follows_a_parallelogram_near_change_points(distance):
-    found = prove(linkage_of('parallelogram'), [distance], [1.0], [0.5])
+    found = prove(closure_of('parallelogram'), [distance], [1.0], [0.5])
     for order, value in enumerate((distance, 1.0, 0.5)):
         rod, follower = found[order]
         assert apart(rod, -value, turning=False) < 1e-40
@@ -175,14 +175,15 @@ def test_interval_enclosure_follows_a_parallelogram_near_change_points(distance)
 
 
 @pytest.mark.parametrize(
-    'name', ['class_3', 'five_bar', 'excavator_bucket', 'whitworth_quick_return']
+    'name',
+    ['class_3', 'five_bar', 'excavator_bucket', 'whitworth_quick_return', *IN_SPACE],
 )
 def test_interval_derivatives_equal_numerical_ones(name):
-    linkage = linkage_of(name)
-    inputs = usual_inputs(Closure(linkage))
+    closure = closure_of(name)
+    inputs = usual_inputs(closure)
     rates = [0.7 - 1.1 * k for k in range(len(inputs))]
     accelerations = [0.3 + k for k in range(len(inputs))]
-    found = prove(linkage, inputs, rates, accelerations)
+    found = prove(closure, inputs, rates, accelerations)
     h = 2.0**-20
 
     def at(time: float) -> Any:
@@ -191,7 +192,7 @@ def test_interval_derivatives_equal_numerical_ones(name):
             for x, v, a in zip(inputs, rates, accelerations, strict=True)
         ]
         return prove(
-            linkage,
+            closure,
             moved,
             [v + a * time for v, a in zip(rates, accelerations, strict=True)],
             accelerations,
@@ -210,21 +211,48 @@ def test_interval_derivatives_equal_numerical_ones(name):
             assert abs(swept - number_of(found.accelerations[k])) < 1e-7
 
 
-@pytest.mark.parametrize('name', ['four_bar', 'jansen_leg', 'scotch_yoke', 'class_3'])
+@pytest.mark.parametrize('name', ['four_bar', 'jansen_leg', 'scotch_yoke', 'class_3', *IN_SPACE])
 def test_thirty_digit_solver_equals_the_interval_enclosure(name):
-    linkage = linkage_of(name)
-    inputs = usual_inputs(Closure(linkage))
+    closure = closure_of(name)
+    inputs = usual_inputs(closure)
     for found, ball in zip(
-        solve(linkage, inputs, 104), prove(linkage, inputs).joints, strict=True
+        solve(closure, inputs, 104), prove(closure, inputs).joints, strict=True
     ):
         assert abs(float((found - ball).mid())) < 1e-28
 
 
 def test_interval_proof_refuses_a_change_point():
     with pytest.raises(SingularError, match='nothing is proved'):
-        prove(linkage_of('parallelogram'), [0.0])
+        prove(closure_of('parallelogram'), [0.0])
 
 
 def test_interval_proof_refuses_an_open_loop():
     with pytest.raises(ValueError, match='open'):
-        prove(linkage_of('double_rocker'), [3.0])
+        prove(closure_of('double_rocker'), [3.0])
+
+
+@pytest.mark.parametrize('name', IN_SPACE)
+def test_spatial_enclosures_hold_the_closed_form_within_rounding(name):
+    """The two share the linkage alone: places and turns of links here, angles of joints there."""
+    closure = closure_of(name)
+    for part in (-0.7, 0.0, 0.4):
+        inputs = [value + 0.03 * part * (k + 1) for k, value in enumerate(usual_inputs(closure))]
+        if closure.position(*inputs).status is not Status.CLOSED:
+            inputs = usual_inputs(closure)
+        position = closure.position(*inputs)
+        rates, changes = [0.5] * len(inputs), [-0.2] * len(inputs)
+        velocity = closure.velocity(position, *rates)
+        acceleration = closure.acceleration(position, velocity, *changes)
+        found = prove(closure, inputs, rates, changes)
+        for order, values in enumerate((position.joints, velocity.joints, acceleration.joints)):
+            for k, value in enumerate(values):
+                unit = 1.0 if closure.turning[k] else closure.scale
+                turning = closure.turning[k] and not order
+                assert apart(found[order][k], value, turning, unit) < 1e-12 * 10.0**order * unit
+
+
+@pytest.mark.parametrize('name', ['bennett', 'hooke_joint', 'spherical_four_bar'])
+def test_over_constrained_linkages_have_no_exact_joints(name):
+    closure = closure_of(name)
+    with pytest.raises(SingularError, match='3 constraints more than unknowns'):
+        prove(closure, usual_inputs(closure))

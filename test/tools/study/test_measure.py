@@ -184,6 +184,17 @@ def test_solver_comparison_orders_errors_as_expected():
     assert all(each.changes is None for each in knob.settings if each is not knob.own_setting)
 
 
+def test_narrower_cells_take_the_place_of_newton_steps(tmp_path):
+    (tmp_path / 'scene.yaml').write_text('linkage: class_3\n')
+    motions = motions_of(load_scene(tmp_path / 'scene.yaml'), 'sine', 10.0)
+    knob = measure_solving(motions, 1000.0, 10.0, quick=True, seconds=0.1)
+    errors = {each.label: each.error.worst for each in knob.settings}
+    step, narrow = errors['iterated, 1 step'], errors['iterated, 1 step from cells 1/4 as wide']
+    assert errors['iterated'] < 1e-14
+    assert 1e-14 < step < 1e-6
+    assert narrow < 1e-2 * step
+
+
 def test_closed_form_solves_hard_cases_the_textbook_fails():
     cases = list(compare_hard_cases())
     failed = {(case.place, case.solver): case.failed for case in cases}
