@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
-from math import remainder, sqrt, tau
+from math import inf, remainder, sqrt, tau
 from typing import NamedTuple
 
 from linkage_ros.description import Scene, SceneLinkage
@@ -34,7 +34,10 @@ from linkage_ros.tools.study.budget_text import ALL_TOGETHER, share_text
 from linkage_ros.tools.study.measuring import Progress
 from linkage_ros.tools.study.prices import Feed, price_scenes, turn_crank, USUAL_RATE
 
-_MOST_TICKS, _MOST_TICKS_QUICK = 20_000, 2_000
+_MOST_TICKS, _MOST_TICKS_QUICK, _FEWEST_TICKS = 20_000, 2_000, 200
+_QUICK_RUNS, _QUICK_PRICES = 2.0, 2.0
+"""Most time of a quick measurement for runs and for prices, in [s]."""
+
 _SECONDS, _SECONDS_QUICK = 0.8, 0.2
 """Time to price one effect, in [s]."""
 
@@ -190,18 +193,22 @@ def measure_deliberate(
     quick: bool = False,
     horizon: float = 10.0,
     feed: Feed = turn_crank,
+    tick: float = 0.0,
     progress: Progress = lambda _: None,
 ) -> list[Knob]:
     """
     Return a knob for each effect and fault of a scene, by size, and one for all of them together.
 
-    The compared runs are as long as the horizon, in [s], or shorter if quick.
+    The compared runs are as long as the horizon, in [s], or shorter if quick: then ``tick`` says
+    what a tick takes, in [s].
     """
     variants = list(_list_variants(scene))
     if not variants:
         return []
     # Faults begin at set times: a shorter run would miss them.
     most = _MOST_TICKS if scene.faults or not quick else _MOST_TICKS_QUICK
+    if quick and tick and not scene.faults:
+        most = min(most, max(_FEWEST_TICKS, int(_QUICK_RUNS / ((1 + len(variants)) * tick))))
     ticks = max(1, min(most, round(horizon * (scene.rate or USUAL_RATE))))
     own = replace(scene, record=None)
     others = [variant.scene for variant in variants]
@@ -212,6 +219,7 @@ def measure_deliberate(
         (_SECONDS_QUICK if quick else _SECONDS) * (len(variants) + 1),
         feed,
         lambda share: progress(0.5 + 0.5 * share),
+        _QUICK_PRICES if quick else inf,
     )
     drifts = any(scene_linkage.drive[1].gives_torque for scene_linkage in scene.linkages)
     after = ticks / (scene.rate or USUAL_RATE) if drifts else None

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
-from math import floor
+from math import floor, inf
 from pathlib import Path
 from time import process_time
 
@@ -37,8 +37,11 @@ _SHARES = {ERRORS: 0.7, EFFECTS: 0.2, RECORDING: 0.1}
 
 _QUICK_LEFT_OUT = '--quick: steps of a drive beyond its half and double, some rates, repetitions'
 
-_QUICK_RUN = 0.9
+_QUICK_RUN = 0.5
 """Longest time that one run of the torque drives may take in a quick measurement, in [s]."""
+
+_QUICK_DRIVE, _QUICK_PRICES, _QUICK_TICK = 4.0, 3.0, 0.7
+"""Time that a quick measurement gives to the drives, to prices, and to the whole tick, in [s]."""
 
 
 def measure_budget(
@@ -82,9 +85,15 @@ def measure_budget(
         knobs += sorted(found, key=lambda knob: knob.own_setting.error.worst, reverse=True)
         left_out += more
         done += _SHARES[ERRORS] / whole
+    tick = tick_price(scene, 0.5 if quick else 3.0, feed, _QUICK_TICK if quick else inf)
     if EFFECTS in parts:
         knobs += measure_deliberate(
-            scene, quick=quick, horizon=horizon, feed=feed, progress=part_progress(EFFECTS)
+            scene,
+            quick=quick,
+            horizon=horizon,
+            feed=feed,
+            tick=1e-6 * tick.tick.middle,
+            progress=part_progress(EFFECTS),
         )
         done += _SHARES[EFFECTS] / whole
     losses: list[RecordingLoss] = []
@@ -96,7 +105,6 @@ def measure_budget(
         losses = measure_recording(
             scene, folder or Path(), quick=quick, feed=feed, progress=part_progress(RECORDING)
         )
-    tick = tick_price(scene, 0.5 if quick else 3.0, feed)
     progress(1.0)
     today = datetime.now().astimezone().date().isoformat()
     return Budget(
@@ -147,7 +155,7 @@ def _measure_errors(
                 horizon,
                 key=scene_key(motion.scene_linkage, 'drive') + '.torque',
                 quick=quick,
-                seconds=(6.0 if quick else 60.0) / integrated,
+                seconds=(_QUICK_DRIVE if quick else 60.0) / integrated,
                 progress=lambda share: progress(0.1 + 0.4 * share),
             )
             left_out += missing
@@ -171,8 +179,13 @@ def _measure_errors(
         knobs.append(measure_solving(motions, rate, horizon, quick=quick, seconds=seconds))
     progress(0.7)
     knobs = [_accepted_settings(scene, knob) for knob in knobs]
-    seconds = 3.0 if quick else 30.0
-    priced = add_prices(scene, knobs, seconds, feed, lambda share: progress(0.7 + 0.3 * share))
+    seconds, most = (_QUICK_PRICES, _QUICK_PRICES) if quick else (30.0, inf)
+    priced = add_prices(
+        scene, knobs, seconds, feed, lambda share: progress(0.7 + 0.3 * share), most
+    )
+    fewer = sum(len(knob.settings) for knob in knobs) - sum(len(one.settings) for one in priced)
+    if fewer:
+        left_out.append(f'for lack of time: {fewer} settings farther from the own one')
     return priced, left_out
 
 

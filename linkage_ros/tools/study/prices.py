@@ -23,10 +23,10 @@ from collections.abc import Callable, Iterator, Sequence
 import gc
 from itertools import islice
 import json
-from math import cos, pi, sin, tau
+from math import cos, inf, pi, sin, tau
 from random import Random
 from statistics import fmean, median
-from time import perf_counter
+from time import perf_counter, process_time
 
 from linkage_ros.description import parse_scene, Scene
 from linkage_ros.errors import LinkageError
@@ -60,6 +60,9 @@ _SLOW_BLOCK = 20
 """Fewest ticks of a block, of a scene that ticks more slowly than those it is compared with."""
 
 _ROUNDS = 12
+_FEWEST_ROUNDS = 3
+"""Rounds of a measurement whose time is up."""
+
 _LAP = 10.0
 """Longest simulated time of a round, in [s]."""
 
@@ -224,13 +227,16 @@ def time_ticks(
     seconds: float,
     feed: Feed = turn_crank,
     progress: Progress = lambda _: None,
+    most: float = inf,
 ) -> list[Rounds]:
     """
     Return for each scene the times of a tick in [µs], of each block in each round.
 
-    It takes some seconds for all of them together. A FileError says that parts of a scene cannot
+    It takes some seconds for all of them together, or more if twelve rounds do; three rounds do
+    after ``most`` seconds of processor time. A FileError says that parts of a scene cannot
     be combined, a LinkageError that a scene publishes nothing.
     """
+    started = process_time()
     timed = [TimedScene(scene, feed) for scene in scenes]
     # Blocks of the same simulated time, so that motions that differ are compared where they are
     # the same.
@@ -266,6 +272,8 @@ def time_ticks(
             for found, blocks_of_scene in zip(rounds, times, strict=True):
                 found.append(blocks_of_scene)
             gc.collect(0)
+            if done + 1 >= _FEWEST_ROUNDS and process_time() - started > most:
+                break
     finally:
         if collecting:
             gc.enable()
@@ -279,9 +287,11 @@ def time_ticks(
     return rounds
 
 
-def tick_price(scene: Scene, seconds: float = 0.5, feed: Feed = turn_crank) -> Price:
+def tick_price(
+    scene: Scene, seconds: float = 0.5, feed: Feed = turn_crank, most: float = inf
+) -> Price:
     """Return what a whole tick of a scene costs, with its crank message; see `time_ticks`."""
-    (rounds,) = time_ticks([scene], seconds, feed)
+    (rounds,) = time_ticks([scene], seconds, feed, most=most)
     return Price(_spread_of_rounds(rounds), scene.rate or USUAL_RATE)
 
 
@@ -291,9 +301,10 @@ def price_scenes(
     seconds: float,
     feed: Feed = turn_crank,
     progress: Progress = lambda _: None,
+    most: float = inf,
 ) -> list[Price]:
     """Return what ticks of other scenes cost more than those of a scene; see `time_ticks`."""
-    own, *changed = time_ticks([scene, *others], seconds, feed, progress)
+    own, *changed = time_ticks([scene, *others], seconds, feed, progress, most)
     return [
         Price(subtract_times(times, own), other.rate or USUAL_RATE)
         for times, other in zip(changed, others, strict=True)
@@ -338,11 +349,13 @@ def add_prices(
     seconds: float,
     feed: Feed = turn_crank,
     progress: Progress = lambda _: None,
+    most: float = inf,
 ) -> list[Knob]:
     """
     Return the knobs with what each setting that a scene can ask for adds to its tick.
 
-    The scene's own setting, those without keys and those that have a price stay as they are.
+    The scene's own setting, those without keys and those that have a price stay as they are. Those
+    whose prices would take more than ``most`` seconds are left out, the farthest ones first.
     """
     asked = {
         (row, column): setting.changes
@@ -351,18 +364,25 @@ def add_prices(
         if setting.changes and setting.price is None and column != knob.chosen
     }
     # Two knobs may ask for the same keys, such as a rate.
-    different = {tuple(settings_of(changes)): changes for changes in asked.values()}
+    nearest = sorted(asked, key=lambda at: abs(at[1] - knobs[at[0]].chosen))
+    different = {tuple(settings_of(asked[at])): asked[at] for at in nearest}
+    if most < inf:
+        begun = process_time()
+        TimedScene(scene, feed).time_block(process_time)
+        each = (1.0 + _FEWEST_ROUNDS) * (process_time() - begun)
+        different = dict(islice(different.items(), max(1, int(most / each) - 1)))
     changed = [change_scene(scene, changes) for changes in different.values()]
-    found = price_scenes(scene, changed, seconds, feed, progress)
+    found = price_scenes(scene, changed, seconds, feed, progress, most)
     prices = dict(zip(different, found, strict=True))
-    return [
-        knob._replace(
-            settings=tuple(
-                setting._replace(price=prices[tuple(settings_of(asked[row, column]))])
-                if (row, column) in asked
-                else setting
-                for column, setting in enumerate(knob.settings)
-            )
+    priced = []
+    for row, knob in enumerate(knobs):
+        settings = []
+        for column, setting in enumerate(knob.settings):
+            if (row, column) not in asked:
+                settings.append(setting)
+            elif price := prices.get(tuple(settings_of(asked[row, column]))):
+                settings.append(setting._replace(price=price))
+        priced.append(
+            knob._replace(settings=tuple(settings), chosen=settings.index(knob.own_setting))
         )
-        for row, knob in enumerate(knobs)
-    ]
+    return priced

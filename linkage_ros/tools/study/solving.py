@@ -59,7 +59,7 @@ _KNOTS = (64, 1024, 16_384)
 _ITERATIONS = ((1, 0), (1, 2), (2, 0), (2, 2), (3, 0))
 """Steps of Newton's method, and how often the cells are halved that they start from."""
 
-_QUICK_COMPARED = 3.0
+_QUICK_COMPARED = 2.0
 """Time after which a quick measurement looks at no further method, in [s]."""
 
 _BITS = 104

@@ -199,6 +199,20 @@ def test_prices_are_added_only_to_requestable_settings() -> None:
     assert filled._replace(settings=knob.settings) == knob
 
 
+def test_price_whose_time_is_up_takes_three_rounds() -> None:
+    (rounds,) = time_ticks([DEMO], 1.0, most=0.0)
+    assert len(rounds) == 3
+
+
+def test_prices_whose_time_is_up_leave_out_the_farthest() -> None:
+    error = JointError(0.0, 0.0)
+    others = [Setting(f'{rate} Hz', error, None, [('rate', rate)]) for rate in (100, 200, 300)]
+    knob = Knob('age in use', [*others, Setting('own', error, None)], 3)
+    (filled,) = add_prices(DEMO, [knob], 0.05, most=0.0)
+    assert [each.label for each in filled.settings] == ['300 Hz', 'own']
+    assert filled.own_setting.label == 'own'
+
+
 def test_silent_scene_has_no_price() -> None:
     late = change_scene(DEMO, [('drive.topic.max_age', 0.05)])
 
