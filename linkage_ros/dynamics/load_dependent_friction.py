@@ -30,17 +30,18 @@ the same bits on every machine.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
+from itertools import islice
 from math import hypot
-from operator import mul
+from operator import add, mul
 from typing import Any, NamedTuple
 
 from linkage_ros.dynamics.joint_matrix import compile_function, JointMatrix, split_numbers
 from linkage_ros.kinematics import Elimination, make_vector, where
 
-_ROUNDS = 12
-_STEPS = 4
-"""Newton steps in a round."""
+_MOST_STEPS = 48
+"""Most steps of Newton's method."""
+
 _STAYS = 4e-15
 """Change at which a friction stays, as a fraction of what it is made of."""
 
@@ -53,11 +54,13 @@ class FrictionSolver:
     Finds the friction in joints by their forces.
 
     ``unknowns`` are the joints; their factor is µ·ρ, in [m], or µ. ``sides`` is the number of
-    right sides of `forces_in`.
+    right sides of `forces_in`, and ``steps`` that of Newton's steps from one test to the next.
     """
 
-    def __init__(self, unknowns: Sequence[Unknown], matrix: JointMatrix, sides: int) -> None:
-        self._unknowns = unknowns
+    def __init__(
+        self, unknowns: Sequence[Unknown], matrix: JointMatrix, sides: int, steps: int = 4
+    ) -> None:
+        self._unknowns, self._steps = unknowns, steps
         self._matrix = matrix
         self._sides = sides
         self._count = len(unknowns)
@@ -154,11 +157,56 @@ class FrictionSolver:
         ]
         return self._iterate(sizes, forces)
 
+    def compile_sliding(
+        self, joints: Sequence[int], inputs: int, dry: int
+    ) -> Callable[..., Sequence[float] | None]:
+        """
+        Return a function that gives the friction in each joint where all of several inputs slide.
+
+        ``joints`` are these joints among all ``dry`` ones. It takes the numbers of `forces_in` one
+        joint after the other, then the inverse inertia, row by row, the slip of each dry joint for
+        a rate of 1 of each input, its direction, the forces on the inputs without these joints,
+        and what resists beside this friction along the positive slip of each dry joint.
+        """
+        sides, count = self._sides, self._count
+
+        def begin_sliding(*numbers: Any) -> list[Any]:
+            parts = iter(numbers)
+            presses = [[*islice(parts, 2 * sides)] for _ in range(count)]
+            mobility = [[*islice(parts, inputs)] for _ in range(inputs)]
+            levers = [[*islice(parts, inputs)] for _ in range(dry)]
+            senses, force = [*islice(parts, dry)], [*islice(parts, inputs)]
+            resisted = [*parts]
+            pushes = zip(force, zip(*levers, strict=True), strict=True)
+            pushed = [push + _sum_products(way, resisted) for push, way in pushes]
+            change = [_sum_products(row, pushed) for row in mobility]
+            moved = [[_sum_products(row, levers[j]) for row in mobility] for j in joints]
+            sizes, forces = [], []
+            first = 1 + inputs
+            for (_, _, factor), piece in zip(self._unknowns, presses, strict=True):
+                x, y = piece[::2], piece[1::2]
+                pair = [of[0] + _sum_products(of[1:], [*change, *resisted]) for of in (x, y)]
+                sizes.append(_STAYS * factor * abs(make_vector(*pair)))
+                forces += pair
+                for j, way in zip(joints, moved, strict=True):
+                    of_unit = (_sum_products(of[1:], way) + of[first + j] for of in (x, y))
+                    forces += [-senses[j] * part for part in of_unit]
+            return [*sizes, *forces]
+
+        length = 2 * count * sides + inputs * (inputs + dry + 1) + 2 * dry
+        begin = compile_function(begin_sliding, length)
+
+        def solve_sliding(*numbers: float) -> Sequence[float] | None:
+            (found,) = begin(*numbers)
+            return self._iterate(found[:count], found[count:])
+
+        return solve_sliding
+
     def _iterate(self, sizes: Sequence[float], moved: Sequence[float]) -> Sequence[float] | None:
         """Return frictions, of which what is small is given, by forces without and by them."""
         count = self._count
         found: Sequence[float] = (0.0,) * count
-        for _ in range(_ROUNDS):
+        for _ in range(_MOST_STEPS // self._steps):
             improved = self._improve(*found, *moved)
             if improved is None:
                 return None
@@ -194,7 +242,7 @@ class FrictionSolver:
         """Return frictions after some Newton steps, and what of each is missing then."""
         count = self._count
         found, forces = [*numbers[:count]], numbers[count:]
-        for _ in range(_STEPS):
+        for _ in range(self._steps):
             missing, slopes = self._missing(found, forces)
             elimination = Elimination(slopes, ())
             if any(divisor == 0.0 for divisor in elimination.divisors):
@@ -223,6 +271,11 @@ class FrictionSolver:
         return missing, slopes
 
 
+def _sum_products(one: Sequence[Any], other: Sequence[Any]) -> Any:
+    """Return the scalar product, as far as both go."""
+    return reduce(add, map(mul, one, other))
+
+
 class Pressing(NamedTuple):
     """What of several inputs makes friction grow with the forces in joints."""
 
@@ -231,6 +284,7 @@ class Pressing(NamedTuple):
     solver: FrictionSolver
     # As `linkage_ros.dynamics.reactions.Reactions.joint_presses`.
     forces_at: Callable[[Sequence[float], Sequence[float], float], Sequence[float]]
+    solve_sliding: Callable[..., Sequence[float] | None]  # Of `FrictionSolver.compile_sliding`
 
     def mount_on(self, terms: Callable[..., Any]) -> Callable[..., Any]:
         """Return an equation of motion of several inputs with the forces in these joints."""

@@ -336,7 +336,9 @@ class Reactions:
 
         dry, inputs = self._mechanics.dry_joints, self._mechanics.closure.input_names
         joints = tuple(k for k, rubbing in enumerate(dry) if rubbing.friction.coefficient)
-        return Pressing(joints, len(inputs), self._frictions, self.joint_presses)
+        solver = self._frictions
+        slides = solver.compile_sliding(joints, len(inputs), len(dry))
+        return Pressing(joints, len(inputs), solver, self.joint_presses, slides)
 
     def joint_presses(
         self, values: Sequence[float], rates: Sequence[float], seconds: float
@@ -464,7 +466,8 @@ class Reactions:
         sides, count = 2 + len(unknowns), len(mechanics.closure.input_names)
         if count > 1:
             sides = 1 + count + len(mechanics.dry_joints) + len(mechanics.stopped_joints)
-        return FrictionSolver(unknowns, self._matrix, sides)
+        # Several inputs test each step: three are usual.
+        return FrictionSolver(unknowns, self._matrix, sides, 4 if count == 1 else 1)
 
     @cached_property
     def _solve_forces(self) -> Callable[..., Sequence[float] | None]:

@@ -49,6 +49,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from math import copysign, hypot, inf, ulp
 from operator import add, mul, sub
 from types import MappingProxyType
@@ -437,6 +438,8 @@ class SeveralDofMechanism:
         self, terms: InputTerms, rate: InputVector, time: float, piece: _Piece
     ) -> _Resolved | None:
         """Return the forces with those of joints that stick and slide; None where it jams."""
+        if terms.presses and not (piece.sticking or piece.held) and all(piece.senses.values()):
+            return self._resolve_sliding(terms, rate, time, piece)
         force = self._force(terms, rate, time, piece)
         if not piece.sticking and self.pressing is None:
             return _Resolved(force)
@@ -494,6 +497,42 @@ class SeveralDofMechanism:
         resisted = self._sliding_frictions(slips, piece, frictions) | parts
         change = self._move(terms, force, piece)
         return _Resolved(force, parts, self._press_frictions(presses, change, resisted))
+
+    def _resolve_sliding(
+        self, terms: InputTerms, rate: InputVector, time: float, piece: _Piece
+    ) -> _Resolved | None:
+        """Return the forces where every joint slides."""
+        assert self.pressing is not None
+        assert terms.presses is not None
+        presses, slips = terms.presses(time), terms.slips
+        if not presses:
+            return None
+        force = self._force(terms, rate, time, piece._replace(senses={}))
+        for n, brake in enumerate(piece.brakes):
+            if brake:
+                own = [float(n == k) for k in range(len(force))]
+                force -= (piece.senses[len(slips) + n] * brake) * InputVector(own)
+        senses = [piece.senses[j] for j in range(len(slips))]
+        resisted = [
+            -sense * friction.sliding(slip.rate)
+            for sense, friction, slip in zip(senses, self.frictions, slips, strict=True)
+        ]
+        rows = [slip.levers for slip in slips]
+        found = self.pressing.solve_sliding(
+            *presses, *chain(*terms.mobility), *chain(*rows), *senses, *force, *resisted
+        )
+        if found is None:
+            return None
+        for j, friction in zip(self.pressing.joints, found, strict=True):
+            resisted[j] -= senses[j] * friction
+        return _Resolved(
+            InputVector(
+                [
+                    push + sum(map(mul, levers, resisted))
+                    for push, levers in zip(force, zip(*rows, strict=True), strict=True)
+                ]
+            )
+        )
 
     def _break_margin(self, motion: SeveralMotion, piece: _Piece) -> float:
         """Return how much more the joints hold that stick; negative where one breaks away."""
