@@ -84,6 +84,9 @@ _PROBE = 1e-3
 """Fraction of a step after which a motion that is held at a toggle is seen to leave it."""
 
 
+_SPARE, _EACH = 5 * PIECES, 3
+"""Most pieces that are saved for a step, enough for runs of bounces, and how many each brings."""
+
 _FIXED = 1e-13
 """Change of a friction by forces at which it stays, as a fraction of it."""
 
@@ -119,6 +122,7 @@ class SeveralMotion(NamedTuple):
     ahead: float = 0.0  # The time since the start of the step in which it was found, in [s]
     resting: frozenset[int] = frozenset()  # Joints and brakes that do not slip, by number
     coarse: int = 0  # Steps so far with too many impacts, of which the last ones did not bounce
+    spare: int = _SPARE  # Pieces that earlier steps have left over
 
 
 class _StepEnd(NamedTuple):
@@ -204,25 +208,28 @@ class SeveralDofMechanism:
         Advance a state by one step.
 
         A step that leads to where no motion exists is halved until it succeeds. If no part of it
-        succeeds, the mechanism is held as by a stop. So the work is bounded, whatever the force.
+        succeeds, the mechanism is held as by a stop. Impacts are bounded by a count that is saved
+        from step to step. So the work is bounded, whatever the force.
 
         ``seconds`` is the length of the step, ``force`` has τ on each input and ``brakes`` what
         the brake of each holds, in [N·m] or [N]. ``time`` is the time of the state since the first
         tick, in [s].
         """
-        # With more than so many pieces no impact bounces; with twice as many the rest is left out.
+        # With more than so many pieces no impact bounces; with many more the rest is left out.
         left, pieces, cuts, coarse = seconds, 0, 0, motion.coarse
-        while pieces < 2 * PIECES:
+        saved = motion.spare + _EACH
+        most = min(PIECES, saved)
+        while pieces < most + PIECES:
             now = time + (seconds - left)
             piece = self._begin_piece(
                 motion, InputVector(force), tuple(brakes), now, cuts=cuts < _CUTS
             )
             reach = self._step_function(motion, piece)
             if self._is_held_at_toggle(motion, reach, left):
-                return _at_rest(motion)._replace(coarse=coarse)
+                return _at_rest(motion)._replace(coarse=coarse, spare=min(saved, _SPARE))
             found = end_of_piece(self, piece, reach, motion, left, seconds * SHORTEST)
             if found is None:
-                return self._bounce(motion)._replace(coarse=coarse)
+                return self._bounce(motion)._replace(coarse=coarse, spare=min(saved, _SPARE))
             length, reached, event = found
             if event and event.kind in ('leave', 'segment', 'break', 'halt'):
                 cuts += 1
@@ -236,14 +243,15 @@ class SeveralDofMechanism:
             if event and event.kind == 'toggle':
                 motion = self._bounce(motion)
             elif event and event.kind == 'stop':
-                motion = self._meet_stop(motion, event.number, bounces=pieces < PIECES)
+                motion = self._meet_stop(motion, event.number, bounces=pieces < most)
             left -= length
             if left <= seconds * NARROW:
                 break
         else:
             motion = _at_rest(motion)
-        coarse += pieces >= PIECES
-        return motion._replace(coarse=coarse) if coarse else motion
+        coarse += pieces >= most
+        spare = min(max(0, saved - pieces), _SPARE)
+        return motion._replace(coarse=coarse, spare=spare)
 
     def leaning_sides(self, motion: SeveralMotion) -> dict[int, int]:
         """Return the joints that lean on their stops: 1 on the upper one, −1 on the lower."""
@@ -775,7 +783,8 @@ class SeveralDofMechanism:
         """
         Return the state after an impact of an input, or of another joint, on its nearer stop.
 
-        What touches its stop already bears a part of the blow, as far as it is pressed against it.
+        What touches its stop already bears a part of the blow, as far as it is pressed against it;
+        where nothing ``bounces`` any more, a joint that leans on its stop stays there.
         Friction takes no part: in no time a force with a limit takes no momentum.
         """
         count, met = len(self.stops), motion
@@ -787,7 +796,9 @@ class SeveralDofMechanism:
         sides = {
             n: 1 if met.value[n] >= self.stops[n][1] else -1 for n in self._inputs_at_stops(met)
         }
-        sides |= {count + k: side for k, side in self.leaning_sides(motion).items()}
+        leaning = {count + k: side for k, side in self.leaning_sides(motion).items()}
+        sides |= leaning
+        glued = () if bounces else leaning.keys() - {number}
         if number >= count:
             sides[number] = self._nearer_stop(number - count, terms)
         rows = {
@@ -811,7 +822,11 @@ class SeveralDofMechanism:
         impulses, _ = settle_forces(
             [[sum(map(mul, row, way)) for way in moved] for row in rows.values()],
             [rate + returned.get(c, 0.0) for c, rate in closing.items()],
-            [(-inf, 0.0) if side > 0 else (0.0, inf) for side in sides.values()],
+            [
+                # Two that open each other by ever smaller blows would never lean together.
+                (-inf, inf) if c in glued else (-inf, 0.0) if side > 0 else (0.0, inf)
+                for c, side in sides.items()
+            ],
         )
         rates, borne = before, set()
         for c, way, impulse in zip(sides, moved, impulses, strict=True):
@@ -827,7 +842,7 @@ class SeveralDofMechanism:
             for c in sides
             if c >= count
             and not returned.get(c)
-            and (c in borne or after.terms.limited[c - count].is_still(after.rate))
+            and (c in borne or c in glued or after.terms.limited[c - count].is_still(after.rate))
         )
         return after._replace(resting=resting)
 

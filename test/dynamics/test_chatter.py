@@ -14,14 +14,25 @@ What is counted is work, not time: how often the equation of motion is asked for
 
 from dataclasses import replace
 from itertools import pairwise
+from math import inf
 
-from linkage_ros.dynamics import Loads, Mechanics, METHODS, SingleDofMechanism, Terms, TwoMasses
+from linkage_ros.dynamics import (
+    behind_play,
+    Loads,
+    Mechanics,
+    METHODS,
+    MotorPlay,
+    SeveralDofMechanism,
+    SingleDofMechanism,
+    Terms,
+    TwoMasses,
+)
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure
 from linkage_ros.messages import EffortCommand
 import pytest
 
-from .loaded import BEGIN, FOLDER, shipped
+from .loaded import BEGIN, closed, FOLDER, shipped
 from ..support.scenes import pipeline_of
 
 MS = 1_000_000
@@ -67,6 +78,30 @@ def test_chattering_step_stays_within_its_evaluation_bound(name):
         assert asked <= most * (number + 100), f'{number} steps, {motion.rate:.0f} rad/s'
         assert abs(motion.motor.value - motion.crank.value) <= 0.5 * play + 1e-9
     assert asked <= most * (STEPS + 60)
+
+
+@pytest.mark.parametrize('restitution', [0.5, 1.0])
+@pytest.mark.parametrize('inertia', [2e-4, 1e-6])
+def test_chattering_step_of_several_inputs_stays_within_bound(restitution, inertia):
+    equation = Mechanics(closed('five_bar'), Loads(drive_inertia=1e-3)).input_equation
+    asked = 0
+
+    def counted(values, rates):
+        nonlocal asked
+        asked += 1
+        return equation(values, rates)
+
+    bare = SeveralDofMechanism(counted, METHODS['rk4'].step, ((-inf, inf),) * 2)
+    play = MotorPlay(0.002, inertia, restitution)
+    mechanism = behind_play(bare, {0: play, 1: play})
+    motion = mechanism.state_at([1.2, 1.9, 1.2, 1.9], [0.0] * 4)
+    for number in range(1, STEPS // 4 + 1):
+        motion = mechanism.advance(motion, 1e-3, [0.0, 0.0, 0.5, -0.3], (), 1e-3 * number)
+        assert asked <= 150 * (number + 100), number
+        for at in (0, 1):
+            assert abs(motion.value[2 + at] - motion.value[at]) <= 0.001 + 1e-9
+    # Pushed on, motors and cranks move as one.
+    assert motion.rate[0] == pytest.approx(4.43, abs=0.05)
 
 
 @pytest.mark.parametrize('force', [0.4, -0.4, 0.0])
