@@ -190,6 +190,10 @@ class _End(NamedTuple):
     frame: Any
     axis: Any
 
+    def as_floats(self) -> _End:
+        """Return the end with doubles."""
+        return self._replace(frame=self.frame.astype(float), axis=self.axis.astype(float))
+
 
 class _Loop(NamedTuple):
     """Two frames of links that meet, and what of their directions does."""
@@ -228,12 +232,7 @@ class Judge:
             for joint in self.tree
         ]
         rough.loops = [
-            loop._replace(
-                ends=tuple(
-                    end._replace(frame=end.frame.astype(float), axis=end.axis.astype(float))
-                    for end in loop.ends
-                )
-            )
+            loop._replace(ends=(loop.ends[0].as_floats(), loop.ends[1].as_floats()))
             for loop in self.loops
         ]
         return rough
@@ -261,8 +260,8 @@ class Judge:
             pose = joint.findtext('pose', '0 0 0 0 0 0').split()
             there = _frame({'xyz': ' '.join(pose[:3]), 'rpy': ' '.join(pose[3:])})
             on = _inverse(frames[parent]) @ frames[child] @ there
-            ends = _End(parent, on, _AXIS), _End(child, there, _AXIS)
-            yield _Loop(joint.get('type', ''), ends, has_axis=False)
+            met = _End(parent, on, _AXIS), _End(child, there, _AXIS)
+            yield _Loop(joint.get('type', ''), met, has_axis=False)
 
     def _frames(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the frames of all links."""
@@ -325,9 +324,9 @@ def _read_joint(joint: ET.Element) -> _Joint:
     found = {child.tag: child.attrib for child in joint}
     way = _numbers(found.get('axis', {}), 'xyz', '1 0 0')
     way = way / (_size(way) or 1)
-    ends = (found[end]['link'] for end in ('parent', 'child'))
+    parent, child = (found[end]['link'] for end in ('parent', 'child'))
     base = _frame(found.get('origin', {}))
-    return _Joint(joint.get('name', ''), joint.get('type', ''), *ends, base, way)
+    return _Joint(joint.get('name', ''), joint.get('type', ''), parent, child, base, way)
 
 
 def _numbers_of(values: Any) -> Any:
@@ -378,10 +377,10 @@ def _drive_by_joints(closure: Any) -> Any:
     rows = [k for k, name in enumerate(closure.joint_names) if name not in closure.input_names]
     sets = [*islice(combinations(rows, len(closure.input_names)), _SETS)]
     least = {of: float(np.linalg.svd(slopes[[*of]], compute_uv=False)[-1]) for of in sets}
-    for rows in sorted(sets, key=least.__getitem__, reverse=True)[:_TRIED]:
-        if least[rows] > _RANK:
+    for chosen in sorted(sets, key=least.__getitem__, reverse=True)[:_TRIED]:
+        if least[chosen] > _RANK:
             with suppress(DefinitionError):
-                return closure.driven_by(*(closure.joint_names[k] for k in rows))
+                return closure.driven_by(*(closure.joint_names[k] for k in chosen))
     return None
 
 
