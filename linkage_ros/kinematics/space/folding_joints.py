@@ -70,7 +70,7 @@ _NEAR = 1e-6
 _ROUNDING = 2.0**-50
 """A coefficient below this is rounding, where the greatest is 1."""
 
-_SAMPLES, _HALVINGS = 360, 52
+_SAMPLES, _HALVINGS = 180, 52
 """Samples of a form of degree 4, which has four extremes at most, and of a part between two."""
 
 
@@ -130,8 +130,9 @@ def _angles_of_valleys(form: Form, *, turns: bool) -> Iterator[float]:
     """Yield the angles of (C, S) at which a form is least, but that of an endless slide."""
     slope = _slope(form, turns=True)
     angles = [pi * (k + 0.37) / _SAMPLES for k in range(_SAMPLES + 1)]
-    for low, high in pairwise(angles):
-        if _value(slope, _unit(low)) < 0.0 <= _value(slope, _unit(high)):
+    falls = [_value(slope, _unit(angle)) < 0.0 for angle in angles]
+    for (low, high), (before, after) in zip(pairwise(angles), pairwise(falls), strict=True):
+        if before and not after:
             angle = _end_of_fall(slope, low, high)
             if turns or abs(math.cos(angle)) > _NEAR:
                 yield angle

@@ -13,7 +13,8 @@ E·cos q + F·sin q = G for a hinge and a quadratic equation for a slide, and go
 that is smooth: of both solutions it takes the one that the last two states lead to.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from itertools import combinations
 from math import acos, atan2, cos, hypot, pi, remainder, sin, sqrt, tau
 import random
@@ -352,3 +353,29 @@ def test_single_change_point_repeats_after_two_turns() -> None:
     once, again, twice = (closure.position(0.5 + turns * tau)['q'] for turns in range(3))
     assert made.apart(once, twice) == pytest.approx(0.0, abs=1e-12)
     assert abs(made.apart(once, again)) > 0.1
+
+
+@pytest.mark.parametrize('kind', ['parallelogram', 'kite on its side', 'rhombus', *RODS])
+def test_rounded_coordinates_pass_the_same_change_points(kind: str) -> None:
+    made = draw(kind, 1)
+    exact = closure_as_drawn(made.linkage)
+
+    def shorten(vector: tuple[float, ...]) -> tuple[float, float, float]:
+        x, y, z = (float(f'{part:.11f}') for part in vector)
+        return x, y, z
+
+    def with_rounded(joints: Mapping[str, SpatialJoint]) -> dict[str, SpatialJoint]:
+        return {
+            name: replace(joint, axis=shorten(joint.axis), at=shorten(joint.at))
+            for name, joint in joints.items()
+        }
+
+    points = {name: shorten(place) for name, place in made.linkage.points.items()}
+    hinges, slides = with_rounded(made.linkage.hinges), with_rounded(made.linkage.slides)
+    rounded = closure_as_drawn(replace(made.linkage, points=points, hinges=hinges, slides=slides))
+    assert len(change_points_of(rounded)) == len(change_points_of(exact)) > 0
+    for place in change_points_of(exact):
+        for off in (-0.2, -1e-3, 1e-3, 0.2):
+            value = place + off * made.drive
+            apart = made.apart(rounded.position(value)['q'], exact.position(value)['q'])
+            assert abs(apart) < 1e-5
