@@ -59,7 +59,7 @@ _PARTS = (*(0.5 + 0.5 * _NODES), 1.0)
 _FACTORS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 _QUICK_FACTORS = (0.2, 0.5, 1.0, 2.0, 5.0)
 
-_TICKS = 1000
+_TICKS, _QUICK_TICKS = 1000, 200
 _PHASES = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 """Ages of the newest sample at a tick, in periods of the samples."""
 
@@ -175,7 +175,8 @@ def measure_age_of_command(
     key = f'{scene_key(motion.scene_linkage, "drive")}.{name}'
     if not isinstance(use, TopicDrive):
         use = TopicDrive(carry_forward=use.carry_forward, max_age=use.max_age, stamp=use.stamp)
-    joints = _CommandSamples(motion, scene.rate or motion.sample_rate, horizon)
+    most = _QUICK_TICKS if quick else _TICKS
+    joints = _CommandSamples(motion, scene.rate or motion.sample_rate, horizon, most)
 
     def measure_setting(
         changes: dict[str, Any], factor: float = 1.0, advice: str = '', label: str = ''
@@ -237,11 +238,11 @@ def _offer_time(motion: LinkageMotion, seconds: float) -> Spread:
 class _CommandSamples:
     """Ticks of a linkage, and the samples that come to them."""
 
-    def __init__(self, motion: LinkageMotion, rate: float, horizon: float) -> None:
+    def __init__(self, motion: LinkageMotion, rate: float, horizon: float, most: int) -> None:
         self._motion = motion
         # The samples of a bag came at ticks, those of a sine come at any time between two.
         self._ticks = (
-            draw_ticks(rate, horizon, _TICKS) if motion.samples else draw_times(horizon, _TICKS)
+            draw_ticks(rate, horizon, most) if motion.samples else draw_times(horizon, most)
         )
         self._exact, _ = joints_at(motion.closure, cranks_at(motion, self._ticks))
 

@@ -269,6 +269,9 @@ def time_ticks(
                 for index in order:
                     times[index].append(timed[index].time_block(clock))
                 progress((done + len(times[0]) / blocks) / count)
+                if not done and process_time() - started > 0.5 * most:
+                    blocks = len(times[0])
+                    break
             for found, blocks_of_scene in zip(rounds, times, strict=True):
                 found.append(blocks_of_scene)
             gc.collect(0)
