@@ -119,6 +119,8 @@ def camera_of(arguments: argparse.Namespace, closure: Any) -> list[float | None]
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Draw the linkage."""
+    if arguments.reach:
+        _check_reach(arguments)
     named = named_file(arguments.file, 'linkages')
     content = linkage_content(named, robot_of(arguments))
     is_dxf = arguments.output and arguments.output.suffix.lower() == '.dxf'
@@ -152,6 +154,17 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     paint_picture(shown, name, file, names=arguments.names, camera=camera)
     print(file)
     return 0
+
+
+def _check_reach(arguments: argparse.Namespace) -> None:
+    """Refuse what says nothing of a picture of joints instead of links."""
+    for option in ('at', 'names', 'assemblies', 'azimuth', 'elevation'):
+        given = getattr(arguments, option)
+        if given or isinstance(given, float):
+            raise LinkageError(f'--{option}', 'says nothing with --reach', 'leave one of them out')
+    if arguments.output and arguments.output.suffix.lower() == '.dxf':
+        file = arguments.output.with_suffix('.svg')
+        raise LinkageError(f'{arguments.output}', 'has the outlines of parts', f'write -o {file}')
 
 
 def _draw_reach(closure: Closure, arguments: argparse.Namespace, units: DisplayUnits) -> int:

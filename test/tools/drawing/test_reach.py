@@ -44,3 +44,24 @@ def test_draw_names_the_limits_of_a_reach(tmp_path, monkeypatch, capsys):
         'linkage draw: four_bar: has no two inputs with limits that move two joints; '
         'write limits of both inputs, or of two joints\n'
     )
+
+
+@pytest.mark.parametrize(
+    ('words', 'said'),
+    [
+        (['--at', '3', '4'], '--at: says nothing with --reach; leave one of them out'),
+        (['--names'], '--names: says nothing with --reach; leave one of them out'),
+        (['--assemblies'], '--assemblies: says nothing with --reach; leave one of them out'),
+        (['--azimuth', '0'], '--azimuth: says nothing with --reach; leave one of them out'),
+        (['--elevation', '9'], '--elevation: says nothing with --reach; leave one of them out'),
+        (['-o', 'x.dxf'], 'x.dxf: has the outlines of parts; write -o x.svg'),
+    ],
+)
+@pytest.mark.parametrize('name', ['ankle_motors', 'five_bar'])
+def test_options_without_effect_on_reach_are_refused(
+    capsys, tmp_path, monkeypatch, name, words, said
+):
+    monkeypatch.chdir(tmp_path)
+    assert main(['draw', name, '--reach', *words]) == 2
+    assert said in capsys.readouterr().err
+    assert not [*tmp_path.iterdir()]
