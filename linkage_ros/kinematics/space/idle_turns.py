@@ -23,6 +23,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
+from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics.plane.linkage import GROUND
 from linkage_ros.kinematics.space.linkage import size_of, SpaceLinkage, SpatialJoint
 from linkage_ros.kinematics.space.merged_pose import MERGED
@@ -71,6 +72,7 @@ def hold_idle_turns(linkage: SpaceLinkage) -> IdleTurns:
     rods: list[list[_IdleEnd]] = []
     while found := next(_idle_turns(still, reach), None):
         name, gone, balls = found
+        _check_traced(still, name, gone, balls, reach)
         (kept,) = {still.hinges[name].parent, still.hinges[name].child} - {gone}
         one_with = {of: kept if on == gone else on for of, on in one_with.items()} | {gone: kept}
         still = _as_one(still, name, gone, kept)
@@ -89,6 +91,22 @@ def hold_idle_turns(linkage: SpaceLinkage) -> IdleTurns:
     hinges = {name: hinge for name, hinge in still.hinges.items() if name not in chains}
     planned = replace(hung, hinges=hinges)
     return IdleTurns(still, planned, hung if chains else None, one_with)
+
+
+def _check_traced(
+    linkage: SpaceLinkage, name: str, gone: str, balls: list[_IdleEnd], reach: float
+) -> None:
+    """Refuse a traced point that a turn moves which nothing determines."""
+    hinge = linkage.hinges[name]
+    at, axis = hinge.at, hinge.axis
+    if balls:
+        at, axis = balls[0].place, minus(balls[1].place, balls[0].place)
+    for link in dict.fromkeys([ball.link for ball in balls] or [gone]):
+        for point in linkage.links.get(link, ()):
+            arm = minus(linkage.points[point], at)
+            if point in linkage.traced and length(cross(arm, direction_of(axis))) > reach:
+                reason = f'{quote(point)} is on {link}, which may turn about itself'
+                raise DefinitionError('traced', reason, 'trace a point on its axis, or drive it')
 
 
 def _as_one(linkage: SpaceLinkage, name: str, gone: str, kept: str) -> SpaceLinkage:

@@ -163,6 +163,32 @@ def test_rings_at_hinges_change_no_state(name, seed):
         assert sums == pytest.approx(whole.position(*inputs).joints, abs=1e-9)
 
 
+def with_traced_point(linkage, link, place):
+    """Return the linkage with a traced point P of a link."""
+    points = {**linkage.points, 'P': tuple(map(float, place))}
+    links = {**linkage.links, link: (*linkage.links.get(link, ()), 'P')}
+    return replace(linkage, points=points, links=links, traced=('P',))
+
+
+@pytest.mark.parametrize('carrier', ['ring', 'rod'])
+def test_traced_point_beside_an_idle_axis_is_refused(carrier):
+    """Nothing says where a ring or a rod turns such a point; one on the axis has its place."""
+    linkage, rng = load('rssr').linkage, np.random.default_rng(5)
+    if carrier == 'ring':
+        linkage, link = with_ring(linkage, 'rocker_joint', rng), 'rocker_joint_ring'
+        hinge = linkage.hinges['rocker_joint']
+        at, axis = np.array(hinge.at), np.array(hinge.axis)
+    else:
+        link, (one, other) = 'rod', linkage.links['rod']
+        at = np.array(linkage.points[one])
+        axis = np.array(linkage.points[other]) - at
+        linkage = written_as_hinges(linkage, 'rod', one, rng)
+    beside = 0.01 * np.cross(axis, (0.3, 0.5, 0.7)) / np.linalg.norm(axis)
+    SpaceClosure(with_traced_point(linkage, link, at + 0.4 * axis))
+    with pytest.raises(DefinitionError, match=f"'P' is on {link}, which may turn about itself"):
+        SpaceClosure(with_traced_point(linkage, link, at + 0.4 * axis + beside))
+
+
 def test_driven_rod_spin_stays_an_input():
     closure = load(ROBOT, {'input': ['m1', 'm2', 'r1z', 'r2z']})
     assert closure.held == ()
