@@ -318,7 +318,7 @@ class _Robot:
 
     def input_sets(self) -> list[tuple[str, ...]]:
         """
-        Return sets of joints that could drive it; none where there are too many.
+        Return sets of joints that could drive it, the first few; none where too many are tried.
 
         They are those of fewest kinds of motors, as the limits of effort and rate tell them.
         """
@@ -335,7 +335,7 @@ class _Robot:
         found = find_input_sets(linkage, CarriedPoints(linkage, unit_of(linkage)), names)
         kinds = [len({(limits[k].effort, limits[k].velocity) for k in one}) for one in found]
         least = [one for one, count in zip(found, kinds, strict=True) if count == min(kinds)]
-        return least if len(least) <= _MOST_TOLD else []
+        return least[:_MOST_TOLD]
 
     def _error(self, where: str, reason: str, remedy: str) -> FileError:
         return FileError(self._urdf.file, where, reason, remedy)

@@ -621,6 +621,17 @@ def test_urdf_tags_select_the_motor_joints(tmp_path, added, inputs):
     assert told.input_names == ('pitch', 'roll'), 'who names inputs is heard'
 
 
+@pytest.mark.parametrize('name', ['ankle', 'rover', 'palletizer', 'turntable'])
+def test_suggested_inputs_of_a_robot_drive_it(tmp_path, name):
+    told = {key: value for key, value in CHOICES[name][0].items() if key != 'input'}
+    text = re.sub(' independent="true"', '', (ROBOTS / f'{name}.urdf').read_text())
+    with pytest.raises(LinkageError, match='does not say which joint drives it; write') as caught:
+        read(tmp_path, text, **told)
+    (inputs,) = re.findall(r'in a scene input: \[(.*)\]$', str(caught.value))
+    closure = read(tmp_path, text, **told, input=inputs.split(', '))
+    assert closure.position(*closure.linkage.pose.inputs).status.has_rates
+
+
 @pytest.mark.parametrize(('apart', 'told'), [(0.0, 0.0), (1e-9, 0.0), (0.012, 0.012)])
 def test_planar_pin_offset_along_its_axis_is_recorded(tmp_path, apart, told):
     """Links of a plane lie beside each other; a wrong place along the axis looks the same."""
