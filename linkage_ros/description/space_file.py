@@ -68,6 +68,9 @@ def _own_key(content: Section, where: str) -> str:
 def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
     read_units(content)
     sliding = [*_names(content, 'slides'), *_names(content, 'struts')]
+    if 'input' not in content:
+        joint = next(iter([*_names(content, 'hinges'), *sliding]), 'JOINT')
+        raise content.error('', "the key 'input' is missing", f'add input: {joint}')
     values = read_parameters(content, SPACE, {'slide': sliding})
     points, massless = values['points'], []
     links = {link: tuple(names) for link, names in values.get('links', {}).items()}

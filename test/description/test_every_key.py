@@ -244,11 +244,15 @@ def test_scene_with_damaged_keys_is_refused_in_one_line(name, tmp_path):
         assert error is None or is_one_line(error), (path, str(error))
 
 
-def test_spatial_file_without_input_error_names_the_key():
-    content = yaml.safe_load(LINKAGES['gallery rssr'])
+@pytest.mark.parametrize('name', ['rssr', 'bennett', 'spatial_slider_crank', 'hooke_joint'])
+def test_missing_input_error_names_a_joint_that_drives(name):
+    content = yaml.safe_load(LINKAGES[f'gallery {name}'])
     del content['input']
-    with pytest.raises(FileError, match=r"^rssr: the key 'input' is missing; add input: "):
-        read_any_closure(parse_yaml(flow(content).encode(), 'rssr'))
+    content.pop('joints', None)
+    with pytest.raises(FileError, match=r"^file.yaml: the key 'input' is missing; add") as caught:
+        read_text(flow(content))
+    key, joint = caught.value.remedy.removeprefix('add ').split(': ')
+    read_text(flow(content | {key: joint}))
 
 
 SPATIAL = [name for name, text in LINKAGES.items() if 'points' in yaml.safe_load(text)]
