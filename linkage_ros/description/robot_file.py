@@ -94,6 +94,9 @@ _MOST_JOINTS, _MOST_LOOPS = 100, 20
 _NEAR_ZERO, _MOST_TOLD = 1e-9, 6
 """Least value of a joint that a remedy tells, and the most joints or sets of inputs."""
 
+_PASSIVE = 'passive'
+"""What robots of Onshape call joints that no motor moves."""
+
 _MOST_TRIED = 20
 """Most choices of mimics that are tried."""
 
@@ -262,7 +265,13 @@ class _Robot:
         ends += [(predecessor, successor) for _, predecessor, successor, _ in self._urdf.couplings]
         tied = {joint.name for pair in ends for joint in chain(*self._tree.ways(*pair))}
         tied |= {joint.mimics for joint in self._urdf.joints.values()}
-        return [name for name in self._urdf.actuated if name in tied]
+        if actuated := [name for name in self._urdf.actuated if name in tied]:
+            return actuated
+        # Robots of Onshape say by a name what no motor moves.
+        joints = self._urdf.joints.items()
+        moving = [name for name, joint in joints if name in tied and joint.kind in MOVING]
+        driven = [name for name in moving if _PASSIVE not in name]
+        return driven if len(driven) < len(moving) else []
 
     def _names_of(self, loop: UrdfLoop) -> set[str]:
         ways = self._tree.ways(*(end.link for end in loop.ends))

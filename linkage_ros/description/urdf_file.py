@@ -49,6 +49,9 @@ MOVING = ('revolute', 'continuous', 'prismatic')
 _KINDS = (*MOVING, 'fixed', 'floating', 'planar')
 _FARTHEST = 1e9
 
+_CLOSING = re.compile('closing_.+_1')
+"""The first of two frames that meet."""
+
 _LOOP_TAGS = ('loop_joint', 'loop_constraint', 'constraint', 'loop')
 """Tags outside of URDF that close loops."""
 
@@ -150,8 +153,14 @@ class UrdfFile(NamedTuple):
 
 
 def pin_frames(urdf: UrdfFile) -> dict[str, list[str]]:
-    """Return the links that are called PIN_on_LINK and hang on LINK, by pin."""
-    found: dict[str, list[str]] = {}
+    """
+    Return the links that are called PIN_on_LINK and hang on LINK, by pin.
+
+    Frames closing_NAME_1 and closing_NAME_2, of onshape-to-robot, are alike.
+    """
+    firsts = (link for link in urdf.links if _CLOSING.fullmatch(link))
+    pairs = {first[:-2]: [first, f'{first[:-1]}2'] for first in firsts}
+    found = {name: ends for name, ends in pairs.items() if ends[1] in urdf.links}
     for joint in urdf.joints.values():
         name, on, parent = joint.child.rpartition(f'_on_{joint.parent}')
         if on and name and not parent:

@@ -223,6 +223,35 @@ def test_loop_tag_dialects_give_the_same_states(tmp_path, dialect, kind):
         assert closure.position(*inputs).joints == pytest.approx(joints, abs=1e-14)
 
 
+def closing_frames(pairs):
+    """Return frames as onshape-to-robot writes them: two links where each loop meets."""
+    return ''.join(
+        f'<link name="closing_{number}_{end}"/><joint name="closing_{number}_{end}_frame" '
+        f'type="fixed"><parent link="{link}"/><child link="closing_{number}_{end}"/>'
+        f'<origin xyz="{" ".join(map(str, xyz))}"/></joint>'
+        for number, pair in enumerate(pairs)
+        for end, (link, xyz) in enumerate(pair, 1)
+    )
+
+
+def test_closing_frames_of_onshape_close_loops_without_options(tmp_path):
+    """What is called passive is driven by no motor."""
+    told, pairs, reach = CHOICES['ankle']
+    text = OPEN.sub('', (ROBOTS / 'ankle.urdf').read_text())
+    joints = re.findall(r'<joint name="(\w+)" type="(?:revolute|continuous)"', text)
+    for name in joints:
+        if name not in told['input']:
+            text = re.sub(rf'(joint(?: name)?=)"{name}"', rf'\1"passive_{name}"', text)
+    text = re.sub(r'<(ros2_control|transmission)\b.*?</\1>', '', text, flags=re.DOTALL)
+    closure = read(tmp_path, text.replace('</robot>', closing_frames(pairs) + '</robot>'))
+    expected = load(ROBOTS / 'ankle.urdf', told)
+    assert closure.input_names == expected.input_names
+    for inputs in near_pose(expected, reach, 20):
+        found = closure.position(*inputs)
+        values = [found[f'passive_{name}'] for name in expected.joint_names]
+        assert values == pytest.approx(expected.position(*inputs).joints, abs=1e-14)
+
+
 def test_ankle_driven_by_motors_inverts_its_joints():
     given = {'input': ['m1', 'm2']}
     closure, motors = (
