@@ -37,7 +37,6 @@ from linkage_ros.description.parameters import (
     TextOf,
 )
 from linkage_ros.description.robot_pose import (
-    compose_frames,
     end_frame,
     frame_of,
     LINE,
@@ -566,7 +565,7 @@ class _Robot:
             way = (name, *(joint.parent for joint in self._tree.above[name]))
             carrier = next((on[each] for each in way if on[each] in links), None)
             if body is not None and carrier is not None:
-                at = compose_frames(frames[name], frame_of(body.xyz, body.rpy))
+                at = frames[name].compose(frame_of(body.xyz, body.rpy))
                 part = SpatialMass(body.mass, at.origin, turned_tensor(at[:3], body.tensor))
                 parts.setdefault(carrier, []).append(part)
         return {link: combine_masses(of) for link, of in parts.items()}

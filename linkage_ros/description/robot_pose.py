@@ -104,7 +104,7 @@ class RobotTree:
         for joint in joints or self.joints.values():
             if joint.parent not in frames:
                 continue
-            base = compose_frames(frames[joint.parent], self.bases[joint.name])
+            base = frames[joint.parent].compose(self.bases[joint.name])
             if value := values.get(joint.name, 0.0):
                 axis = base.turn(direction_of(joint.axis))
                 if joint.kind == 'prismatic':
@@ -350,13 +350,7 @@ def _turn_of_frame(one: SpaceFrame, other: SpaceFrame) -> Vector:
 
 def end_frame(end: LoopEnd, frames: Mapping[str, SpaceFrame]) -> SpaceFrame:
     """Return the frame of an end of what closes a loop."""
-    return compose_frames(frames[end.link], frame_of(end.xyz, end.rpy))
-
-
-def compose_frames(outer: SpaceFrame, inner: SpaceFrame) -> SpaceFrame:
-    """Return a frame that is given in another one."""
-    x, y, z = map(outer.turn, inner[:3])
-    return SpaceFrame(x, y, z, outer.place(inner.origin))
+    return frames[end.link].compose(frame_of(end.xyz, end.rpy))
 
 
 def roll_pitch_yaw(x: Vector, y: Vector, z: Vector) -> Vector:

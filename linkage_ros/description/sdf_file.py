@@ -20,7 +20,7 @@ from typing import NoReturn
 from xml.etree import ElementTree as ET
 
 from linkage_ros.description.robot_graph import GraphJoint, RobotGraph, WORLD
-from linkage_ros.description.robot_pose import compose_frames, frame_of
+from linkage_ros.description.robot_pose import frame_of
 from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import (
     direction_of,
@@ -134,7 +134,7 @@ class _SdfReader:
             way[base], base = self._pose_and_base(base)
         frame = self._frames[base]
         for part, pose in reversed(way.items()):
-            frame = self._frames[part] = compose_frames(frame, pose)
+            frame = self._frames[part] = frame.compose(pose)
         return frame
 
     def _pose_and_base(self, name: str) -> tuple[SpaceFrame, str]:
@@ -243,7 +243,7 @@ class _SdfReader:
         (mass,) = self._numbers(_text(inertial, 'mass'), where, 1)
         if mass <= 0.0:
             return None
-        frame = compose_frames(self._frame(name), self._pose(inertial.find('pose'), where))
+        frame = self._frame(name).compose(self._pose(inertial.find('pose'), where))
         keys = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
         xx, xy, xz, yy, yz, zz = (
             self._numbers(_text(inertial, f'inertia/{key}') or '0', where, 1)[0] for key in keys

@@ -346,7 +346,7 @@ class FoldingJoint(Step):
         raise NotImplementedError
 
     def rates(self, pose: FoldedPose, solved: LinkState, velocities: LinkState) -> Any:
-        """Append the rates of the joint and of its child; return the derivatives of its value."""
+        """Append the rates of the joint and of its child; return rate, and slope and bend."""
         p, p1, p2 = self.passing.motion_at(pose.at)
         _, u1, u2 = self.under.motion_at(pose.at)
         w = pose.root
@@ -363,7 +363,7 @@ class FoldingJoint(Step):
         frame, joint = solved.pins[self.closed.child], self.closed.joint
         velocities.coordinates.append(rate)
         velocities.pins.append(joint.motion(solved, velocities, frame, rate))
-        return slope, bend
+        return rate, slope, bend
 
     def accelerations(
         self,
@@ -374,10 +374,9 @@ class FoldingJoint(Step):
         changes: LinkState,
     ) -> None:
         """Append the accelerations of the joint and of its child."""
-        slope, bend = rates
+        rate, slope, bend = rates
         moved = velocities.coordinates[self.course.coordinate]
         change = add(slope * changes.coordinates[self.course.coordinate], bend * (moved * moved))
-        rate = multiply(slope, moved)
         frame, joint = solved.pins[self.closed.child], self.closed.joint
         changes.coordinates.append(change)
         changes.pins.append(joint.change(solved, velocities, changes, frame, rate, change))

@@ -38,8 +38,8 @@ class LowerPair:
 
     def base(self, solved: LinkState) -> SpaceFrame:
         """Return the frame of the child where the joint is 0."""
-        on, seat = solved.pins[self.parent], self.seat
-        return SpaceFrame(on.turn(seat.x), on.turn(seat.y), on.turn(seat.z), on.place(seat.origin))
+        on: SpaceFrame = solved.pins[self.parent]
+        return on.compose(self.seat)
 
     def child_frame(self, base: SpaceFrame, value: float) -> SpaceFrame:
         """Return the frame of the child at a value of the joint."""

@@ -465,8 +465,8 @@ class SpacePlan:
         index = self._set_frame(ends[1], frame)
         self.coordinates[name] = len(self.state.coordinates)
         if isinstance(joint, HingePair):
-            radius, direction = hypot(place[0], place[1]), atan2(place[1], place[0])
-            step: Any = ClosedHinge(joint, place, to, bar, sign, index, radius, direction)
+            radius = hypot(place[0], place[1])
+            step: Any = ClosedHinge(joint, place, to, bar, sign, index, radius, 0.0)
         else:
             step = ClosedSlide(joint, place, to, bar, sign, index)
         side = f'{"+" if sign > 0.0 else "-"}, as in the pose'
@@ -475,8 +475,8 @@ class SpacePlan:
         trial = LinkState([*self.state.coordinates], [*self.state.pins])
         if isinstance(joint, HingePair) and step.close(trial).status.has_pose:
             # Where 0 lies among the whole turns follows from the value in the pose.
-            turns = round((trial.coordinates[-1] - self.pose_value(name)) / tau)
-            step = replace(step, direction=step.direction + tau * turns)
+            found = trial.coordinates[-1]
+            step = replace(step, direction=self._direction(place, found, name))
         self.add_step(step)
         method = f'{name}, on {ends[0]}, by {by} from {known} to {point}'
         self.end_group('closed', (ends[1],), method, side)
@@ -484,9 +484,7 @@ class SpacePlan:
 
     def _fold(self, step: ClosedJoint, on: str, known: str) -> FoldingJoint | None:
         """Return a closed joint that passes its change points, if one joint moves its rod."""
-        seat, link = step.joint.seat, self.pose_frames[on]
-        x, y, z = map(link.turn, seat[:3])
-        base = SpaceFrame(x, y, z, link.place(seat.origin))
+        base = self.pose_frames[on].compose(step.joint.seat)
         end = base.locate(self.places[known])
         for name, joint in self.linkage.pair_joints.items() if not step.rod.moved_by else ():
             ends = {joint.parent, joint.child} - {on}

@@ -43,6 +43,12 @@ class SpaceFrame(NamedTuple):
         """Return a point of the link in the frame of the ground."""
         return plus(self.origin, self.turn(point))
 
+    def compose(self, frame: SpaceFrame) -> SpaceFrame:
+        """Return a frame of the link in the frame of the ground."""
+        return SpaceFrame(
+            self.turn(frame.x), self.turn(frame.y), self.turn(frame.z), self.place(frame.origin)
+        )
+
     def resolve(self, vector: Vector) -> Vector:
         """Return a vector in the frame of the link."""
         return dot(self.x, vector), dot(self.y, vector), dot(self.z, vector)
