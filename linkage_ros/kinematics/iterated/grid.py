@@ -9,10 +9,11 @@
 Solutions of links that close only together, as a function of their inputs, without history.
 
 A grid lies over the inputs. A cell has the solution at its centre, and the form of second order
-about it. It is made when it is first met, from its neighbour on the straight line to the pose, and
-that one likewise: there is one way to each cell, so the order of visits cannot matter. A cell is
-accepted if the theorem of Kantorovich proves, at each quarter of the way and at the corners of the
-cell, that the prediction leads to one solution::
+about it. It is made when it is first met, from its neighbour on the way to the pose, and that one
+likewise: there is one way to each cell, so the order of visits cannot matter. Ways that begin in
+all directions join soon, so few cells are made; none leaves the straight line by more than an
+eighth of its length. A cell is accepted if the theorem of Kantorovich proves, at each quarter of
+the way and at the corners of the cell, that the prediction leads to one solution::
 
     η·ω ≤ 1/4    η = |J⁻¹F|, the first step of Newton's method    ω a bound of |J⁻¹·J'|
 
@@ -421,8 +422,10 @@ class Grid:
         key, along = self._key_of(_LEVELS - 1, inputs), self._group.forms_along
         with BUILD_LOCK:
             last = self._follow(key).last
-            place, done, step = GridPlace(last.inputs, last.unknowns), 0.0, 1.0
             way = [b - a for a, b in zip(last.inputs, inputs, strict=True)]
+            # Its proofs are at quarters only, so no step is longer than those to the widest cells.
+            longest = self.widths[0] / max(self.widths[0], *map(abs, way))
+            place, done, step = GridPlace(last.inputs, last.unknowns), 0.0, longest
             forms = along(*place, way)
             while forms and done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
                 part = min(1.0, done + step)
@@ -432,7 +435,7 @@ class Grid:
                 if found is None:
                     step *= 0.5
                 else:
-                    place, done, step = GridPlace(end, found), part, 2.0 * step
+                    place, done, step = GridPlace(end, found), part, min(longest, 2.0 * step)
                     forms = along(*place, way)
         return place, max(abs(a - b) for a, b in zip(place.inputs, inputs, strict=True))
 

@@ -6,9 +6,13 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The cells of a grid come from the inputs alone: from no state that was asked for before."""
+"""
+The cells of a grid come from the inputs alone, along straight lines that end at folds.
 
-from math import floor, hypot, inf, sqrt
+They do not come from any state that was asked for before.
+"""
+
+from math import floor, hypot, inf, log10, sqrt
 import random
 
 from linkage_ros.kinematics.iterated.grid import Grid, GridInput
@@ -66,6 +70,64 @@ class Sphere:
         return (slope,), (-0.5 * (sum(d * d for d in direction) + slope * slope) / z,)
 
 
+class NearCrossing(Sphere):
+    """Two sheets z² − (x − c)·z + d² = 0 over an input x, with a gap |x − c| < 2·d between."""
+
+    def __init__(self, centre, half_gap):
+        self.centre, self.half_gap = centre, half_gap
+
+    @property
+    def start(self):
+        """The root of smaller size at x = 0; the one beyond the gap looks as its continuation."""
+        return -0.5 * self.centre + sqrt(0.25 * self.centre**2 - self.half_gap**2)
+
+    def matrix(self, inputs, z):
+        return 2.0 * z - (inputs[0] - self.centre)
+
+    def error(self, inputs, z):
+        return z * z - (inputs[0] - self.centre) * z + self.half_gap**2
+
+    def proof(self, inputs, unknowns):
+        (z,) = unknowns
+        matrix = self.matrix(inputs, z)
+        return abs(self.error(inputs, z) / matrix) * abs(2.0 / matrix) if matrix else inf
+
+    def solve_from(self, inputs, unknowns):
+        (z,) = unknowns
+        for _ in range(60):
+            step = self.error(inputs, z) / self.matrix(inputs, z)
+            z -= step
+            if abs(step) <= 4e-16:
+                return [z]
+        return None
+
+    def forms_at(self, inputs, unknowns):
+        (z,) = unknowns
+        slope = z / self.matrix(inputs, z)
+        return [(slope,)], [((slope - slope * slope) / self.matrix(inputs, z),)]
+
+    def forms_along(self, inputs, unknowns, direction):
+        ((slope,),), ((bend,),) = self.forms_at(inputs, unknowns)
+        return (slope * direction[0],), (bend * direction[0] ** 2,)
+
+
+class Flat(Sphere):
+    """One unknown that is 0 everywhere."""
+
+    def __init__(self, places):
+        self.places = places
+
+    def proof(self, inputs, unknowns):
+        return 0.0
+
+    def solve_from(self, inputs, unknowns):
+        self.places.append(inputs)
+        return [0.0]
+
+    def forms_at(self, inputs, unknowns):
+        return [(0.0,)] * 2, [(0.0,)] * 3
+
+
 def sphere_grid(rng, count):
     """Return a function that makes grids of a random sphere, and inputs up to beyond its rim."""
     centre = [rng.uniform(-0.3, 0.3) for _ in range(count)]
@@ -120,3 +182,28 @@ def test_grid_batch_returns_the_cells_of_single_inputs(states, count):
         cell = one_by_one(*given)
         assert found[number] == (cell is not None)
         assert cell is None or tuple(rows[:, number]) == cell
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_way_to_a_cell_bends_by_an_eighth_of_its_length(seed):
+    rng = random.Random(seed)
+    end = rng.uniform(-15.0, 15.0), rng.choice([-15.0, 15.0])
+    places = []
+    grid = Grid(Flat(places), [GridInput(0.0, -inf, inf, False)] * 2, range(2), [0.0])
+    assert grid(*end)
+    assert len(places) >= 120
+    for along, across in places:
+        assert abs(along - end[0] * across / end[1]) < abs(end[1]) / 8.0 + grid.widths[0]
+
+
+@pytest.mark.parametrize('seed', range(100))
+def test_no_line_passes_over_a_gap_of_a_fiftieth_radian(seed):
+    rng = random.Random(seed)
+    centre = rng.uniform(0.3, 1.5)
+    sheets = NearCrossing(centre, 10.0 ** rng.uniform(log10(0.006), log10(0.1)))
+    beyond = centre + 2.0 * sheets.half_gap + rng.uniform(0.0, 4.0)
+    grid = Grid(sheets, [GridInput(0.0, -inf, inf, False)], range(1), [sheets.start])
+    assert grid(beyond) is None
+    place, left = grid.reach((beyond,))
+    assert place.inputs[0] <= centre - 2.0 * sheets.half_gap
+    assert left >= 4.0 * sheets.half_gap
