@@ -29,7 +29,6 @@ from linkage_ros.description.linkage_grammar import (
 )
 from linkage_ros.description.parameters import read_parameters
 from linkage_ros.description.section import Section
-from linkage_ros.description.space_file import is_spatial, read_space_closure
 from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.errors import DefinitionError, FileError, list_names, read_each
 from linkage_ros.kinematics import (
@@ -49,7 +48,6 @@ from linkage_ros.kinematics import (
     Point,
     RevoluteJoint,
     SlideJoint,
-    thin_rod,
     without_drawn_pose,
 )
 from linkage_ros.resources import linkage_names, named_file
@@ -159,8 +157,10 @@ def read_any_closure(
         from linkage_ros.description.robot_file import (
             read_robot_closure as read,  # local import: few linkages are robots
         )
-    elif is_spatial(content):
-        read = read_space_closure
+    elif 'points' in content:
+        from linkage_ros.description.space_file import (
+            read_space_closure as read,  # local import: a planar file does without space
+        )
     else:
         return read_closure(content, name, publish_inputs=publish_inputs)
     return read(
@@ -195,7 +195,7 @@ def read_closure(
 
 def is_planar_file(content: Section) -> bool:
     """Return whether a linkage is written as a planar one: neither a robot nor in space."""
-    return not (is_spatial(content) or 'urdf' in content)
+    return not ('points' in content or 'urdf' in content)
 
 
 def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[Linkage, str]:
@@ -285,10 +285,9 @@ def _mass_of(
     mass = given['mass']
     if not is_rod(content, link, given, [*points]):
         return Mass(mass, given.get('center', (0.0, 0.0)), given.get('inertia', 0.0))
-    one, other = points.values()
-    rod = thin_rod(mass, (*one, 0.0), (*other, 0.0))
-    (x, y, _), (*_, about_z) = rod.center, rod.inertia
-    return Mass(mass, (x, y), about_z)
+    (x, y), (to_x, to_y) = points.values()
+    square = (to_x - x) * (to_x - x) + (to_y - y) * (to_y - y)
+    return Mass(mass, (0.5 * (x + to_x), 0.5 * (y + to_y)), mass / 12.0 * square)
 
 
 def _input_line(points: Mapping[str, Collection[str]]) -> str:

@@ -26,12 +26,12 @@ from linkage_ros.kinematics import (
     Linkage,
     links_by_point,
     RevoluteJoint,
-    SpaceLinkage,
 )
 
 if TYPE_CHECKING:
     from linkage_ros.description.scene import Scene, SceneLinkage
     from linkage_ros.description.section import Section
+    from linkage_ros.kinematics import SpaceLinkage
 
 _OTHER_UNIT = 300.0
 """Ratio of two links above which a unit was probably mistaken; mm for m make it 1000."""
@@ -112,7 +112,7 @@ def _limit_notes(linkage: Linkage | SpaceLinkage, units: Units) -> Iterator[Defi
             driven = name in (given.joint for given in linkage.inputs)
             key = 'input.limits' if driven else f'joints.{name}.limits'
             yield DefinitionError(
-                f'hinges.{name}.limits' if isinstance(linkage, SpaceLinkage) else key,
+                key if isinstance(linkage, Linkage) else f'hinges.{name}.limits',
                 f'{end:g} rad is more than a turn',
                 'if it is in degrees, write angles: degrees',
             )
@@ -120,7 +120,7 @@ def _limit_notes(linkage: Linkage | SpaceLinkage, units: Units) -> Iterator[Defi
 
 def _link_lengths(linkage: Linkage | SpaceLinkage) -> dict[str, float]:
     """Return for each link the greatest distance between its pins, in [m]."""
-    if isinstance(linkage, SpaceLinkage):
+    if not isinstance(linkage, Linkage):
         places = linkage.points
         return {
             link: max(dist(places[one], places[other]) for one, other in combinations(points, 2))
@@ -138,7 +138,7 @@ def _link_lengths(linkage: Linkage | SpaceLinkage) -> dict[str, float]:
 
 def _lengths_with_hinges(linkage: Linkage | SpaceLinkage) -> dict[str, float]:
     """Return the extents of spatial links between their points and hinges, in [m]."""
-    if not isinstance(linkage, SpaceLinkage):
+    if isinstance(linkage, Linkage):
         return {}
     places = {
         link: [linkage.points[point] for point in points] for link, points in linkage.links.items()

@@ -25,10 +25,10 @@ from linkage_ros.kinematics import (
     JointedLinkage,
     Linkage,
     SlideJoint,
-    SpaceLinkage,
 )
 
 if TYPE_CHECKING:
+    from linkage_ros.kinematics import SpaceLinkage
     from linkage_ros.stages.faults import FaultEntry
 
 SPLITS = ('split_bytes', 'split_seconds')
@@ -247,7 +247,7 @@ def parts_of(linkage: Linkage | SpaceLinkage) -> Parts:
         'body': links,
         'point': tuple(f'{link}.{point}' for link, points in carried for point in points),
     }
-    if isinstance(linkage, SpaceLinkage):
+    if not isinstance(linkage, Linkage):
         carried_points = [point for _, points in carried for point in points]
         balls = [point for point in linkage.points if carried_points.count(point) > 1]
         joints = {'pin': parts['any_joint'], 'slider': parts['slide']}

@@ -34,11 +34,6 @@ from linkage_ros.kinematics import (
 )
 
 
-def is_spatial(content: Section) -> bool:
-    """Return whether a linkage file is spatial: it has points of its own."""
-    return 'points' in content
-
-
 def read_space_closure(
     content: Section, name: str, *, publish_inputs: bool, publish_model_joints: bool
 ) -> Closure:

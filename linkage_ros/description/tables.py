@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 import csv
+from html import escape
 from importlib import import_module
 import io
 from math import isfinite
@@ -25,7 +26,6 @@ import os
 from pathlib import Path
 import re
 from typing import Any, BinaryIO, NamedTuple
-from xml.sax.saxutils import escape
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from linkage_ros.description.file_access import check_output_name, read_regular, replace_file
@@ -270,7 +270,7 @@ def _sheet_cell(value: float | str | None) -> str:
     if value is None:
         return '<c/>'
     if isinstance(value, str) or not isfinite(value) or abs(value) > _MOST_EXACT:
-        text = escape(escape_unprintable(str(value)))
+        text = escape(escape_unprintable(str(value)), quote=False)
         return f'<c t="inlineStr"><is><t xml:space="preserve">{text}</t></is></c>'
     return f'<c><v>{value!r}</v></c>'
 

@@ -271,7 +271,7 @@ class Reactions:
         ends = self.joints[near], self.joints[far]
         if isinstance(closure, PlanarClosure):
             return planar_bar(closure, link, *ends)
-        from linkage_ros.dynamics.joint_forms import spatial_bar  # local import: in space only
+        from linkage_ros.dynamics.spatial_forms import spatial_bar  # local import: in space only
 
         return spatial_bar(closure, link, *ends)
 
@@ -749,7 +749,7 @@ def _forms_of(closure: Any, rubbing: Collection[int]) -> JointForms:
     """Return what the joints transmit; of those that rub by their force, first what rubs."""
     if isinstance(closure, PlanarClosure):
         return planar_forms(closure)
-    from linkage_ros.dynamics.joint_forms import spatial_forms  # local import: in space only
+    from linkage_ros.dynamics.spatial_forms import spatial_forms  # local import: in space only
 
     return spatial_forms(closure, rubbing)
 

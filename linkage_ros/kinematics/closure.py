@@ -139,9 +139,13 @@ class Closure:
         """Make a closure of the kind that the linkage needs."""
         kinds: tuple[type[Closure], ...] = (cls,)
         if cls is Closure:
-            from linkage_ros import PlanarClosure, SpaceClosure  # local import: they are closures
+            from linkage_ros import Linkage, PlanarClosure  # local import: it is a closure
 
-            kinds = PlanarClosure, SpaceClosure
+            kinds = (PlanarClosure,)
+            if not isinstance(linkage, Linkage):
+                from linkage_ros import SpaceClosure  # local import: in space only
+
+                kinds = PlanarClosure, SpaceClosure
         for kind in kinds:
             if isinstance(linkage, kind.takes):
                 return super().__new__(kind)

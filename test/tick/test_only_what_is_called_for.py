@@ -54,6 +54,8 @@ SCENES = dict.fromkeys(EFFECTS, Expected()) | {
     'delay': Expected(('velocity',)),
     'markers': Expected(topics=('~/markers',)),
 }
+VECTORS = {'linkage_ros.kinematics.space', 'linkage_ros.kinematics.space.vectors'}
+"""What a planar linkage has of space: markers and forces have three components."""
 ALTERING = {'tolerance', 'friction'}
 """Effects that change what is built, and have no part in a tick."""
 FAULT_SCENES = {
@@ -118,6 +120,8 @@ class Look:
         told = json.loads(run_python(PROGRAM, str(file)))
         assert told['after'] == told['modules'], 'a tick has imported something'
         self.modules = set(told['modules'])
+        spatial = {name for name in self.modules if '.space' in name or '.spatial' in name}
+        assert spatial <= VECTORS, 'the linkage is planar'
         package = f'{ROOT}/'
         self.passed = {
             file.removeprefix(package).removesuffix('.py').replace('/', '.')

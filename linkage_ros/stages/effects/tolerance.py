@@ -43,12 +43,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from random import Random
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from linkage_ros.description import Components, each_part, number, part_names
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import Closure, Linkage, SpaceLinkage
+from linkage_ros.kinematics import Closure, Linkage
 from linkage_ros.stages.effects.effect import LinkageEffect
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics import SpaceLinkage
 
 TRUNCATED = 3.0
 """A deviation is at most this many standard deviations."""
@@ -87,7 +90,7 @@ class ToleranceEffect(LinkageEffect):
     def alter(self, linkage: Linkage | SpaceLinkage, random: Random) -> Linkage | SpaceLinkage:
         """Return the linkage as manufactured; raise `DefinitionError` if it does not close."""
         altered: Linkage | SpaceLinkage
-        if isinstance(linkage, SpaceLinkage):
+        if not isinstance(linkage, Linkage):
             from linkage_ros.kinematics import put_together  # local import: loads numpy
 
             holes = linkage.holes

@@ -11,8 +11,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from html import escape
 from typing import Any
-from xml.sax.saxutils import escape
 
 from linkage_ros.errors import quote
 from linkage_ros.kinematics import (
@@ -101,5 +101,5 @@ def svg(shown: Closure | Position) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
         f'viewBox="0 0 {width:.1f} {height:.1f}" fill="none" stroke-linejoin="round">'
     )
-    title = f'<title>{escape(repr(shown))}</title>'
+    title = f'<title>{escape(repr(shown), quote=False)}</title>'
     return '\n'.join((head, title, *lines, '</svg>\n'))

@@ -18,10 +18,10 @@ the setting has its name only as a title, which a browser shows beside the point
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from html import escape
 from itertools import pairwise
 from math import ceil, floor, log10
 from typing import NamedTuple
-from xml.sax.saxutils import escape
 
 from linkage_ros.kinematics import COLOURS, INK
 from linkage_ros.tools.drawing import GHOST
@@ -211,7 +211,7 @@ class _Picture:
         return '\n'.join(
             [
                 head,
-                f'<title>{escape(title)}</title>',
+                f'<title>{escape(title, quote=False)}</title>',
                 f'<rect width="{WIDTH:g}" height="{self.height:.0f}" fill="#ffffff"/>',
                 *self._draw_legend(),
                 *self._draw_axes(),
@@ -273,7 +273,7 @@ class _Picture:
             for mark in marks:
                 opacity = 0.3 if mark.is_pale else 1.0
                 style = f'fill="{colour}" fill-opacity="{opacity:g}"'
-                yield f'<g><title>{escape(mark.title)}</title>'
+                yield f'<g><title>{escape(mark.title, quote=False)}</title>'
                 if mark.is_own:
                     yield (
                         f'<circle cx="{mark.x:.1f}" cy="{mark.y:.1f}" r="{_MARK + 3.5:g}" '
@@ -378,5 +378,5 @@ def _text_svg(
 ) -> str:
     return (
         f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{fill}"{more}>'
-        f'{escape(text)}</text>'
+        f'{escape(text, quote=False)}</text>'
     )
