@@ -20,7 +20,7 @@ import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
-from itertools import chain, combinations, islice
+from itertools import chain
 import math
 from pathlib import Path
 import resource
@@ -39,6 +39,7 @@ from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics import PlanarClosure
 from mpmath import mp
 import numpy as np
+from scipy.linalg import qr
 
 STATES = 50
 LONGEST = 90
@@ -53,8 +54,8 @@ _DIGITS, _ROUNDS, _MET = 40, 8, 1e-25
 _STEP, _RANK = 1e-6, 1e-7
 """Step of its slopes, in [rad] and [m], and singular values that are rounding."""
 
-_SETS, _TRIED = 2000, 4
-"""Sets of joints that may be inputs: so many are compared, and tried."""
+_TRIED = 12
+"""So many sets of joints are tried as inputs."""
 
 _WRONG = 1e-5
 """Largest difference of a joint that CAD's rounding of redundant equations explains."""
@@ -135,9 +136,10 @@ method with 40 digits. Pins of planar loops may end beside each other. Where a r
 equations than needed, their rounding by CAD decides its last digits: the judge takes least
 squares, the closure those that it needs.
 
-*Back* gives as many joints as there are inputs, those that tell the inputs best in the pose, and
-finds the inputs. *Check* is the processor time of the command, with the search for the pose; *a
-state* that of one position, the mean of all, most of them where none was solved before.
+*Back* gives as many joints as there are inputs, and finds the inputs; or it says why it cannot.
+{_TRIED} sets of joints that tell the inputs in the pose are tried. *Check* is the processor time
+of the command, with the search for the pose; *a state* that of one position, the mean of all,
+most of them where none was solved before.
 """,
 )
 
@@ -371,17 +373,27 @@ def _inverse(frame: Any) -> Any:
     return back
 
 
-def _drive_by_joints(closure: Any) -> Any:
-    """Return the closure with as many joints as inputs: those that tell these best, or None."""
+def _drive_by_joints(closure: Any, draw: np.random.Generator) -> tuple[Any, str]:
+    """
+    Return the closure with as many joints as inputs, or None and why there is none.
+
+    First come the joints that tell the inputs best, by a factorization with pivots, then those
+    among random halves of all: a rod's spin tells of inputs that it does not drive.
+    """
     slopes = np.array(closure.jacobian(closure.close_unlimited(*closure.linkage.pose.inputs)))
     rows = [k for k, name in enumerate(closure.joint_names) if name not in closure.input_names]
-    sets = [*islice(combinations(rows, len(closure.input_names)), _SETS)]
-    least = {of: float(np.linalg.svd(slopes[[*of]], compute_uv=False)[-1]) for of in sets}
-    for chosen in sorted(sets, key=least.__getitem__, reverse=True)[:_TRIED]:
-        if least[chosen] > _RANK:
+    rank = int(np.linalg.matrix_rank(slopes[rows], _RANK))
+    wanted = len(closure.input_names)
+    if rank < wanted:
+        return None, f'joints tell {rank} of {wanted} inputs'
+    for number in range(_TRIED):
+        among = draw.permutation(rows)[: max(wanted, len(rows) // 2)] if number else rows
+        _, least, order = qr(slopes[among].T, pivoting=True)
+        if abs(least[wanted - 1, wanted - 1]) > _RANK:
             with suppress(DefinitionError):
-                return closure.driven_by(*(closure.joint_names[k] for k in chosen))
-    return None
+                names = (closure.joint_names[among[k]] for k in order[:wanted])
+                return closure.driven_by(*names), ''
+    return None, f'none of {_TRIED} sets drives all'
 
 
 def _check(robot: Robot) -> float:
@@ -444,9 +456,9 @@ def measure(robot: Robot, seed: int, states: int = STATES) -> tuple[list[str], s
         *(f'{len(closure.joint_names)}', f'{_check(robot):.1f}', f'{there.seconds * 1e6:.0f}'),
         *(f'{there.closed} of {states}', f'{there.off:.0e}'),
     ]
-    inverse = _drive_by_joints(closure)
+    inverse, reason = _drive_by_joints(closure, draw)
     if inverse is None:
-        return [*row, '', '', ''], ''
+        return [*row, reason, '', ''], ''
     rows = [closure.joint_names.index(name) for name in inverse.input_names]
     found = [closure.close_unlimited(*state).joints for state in drawn]
     back = solve_states(inverse, [[of[k] for k in rows] for of in found if of], judge)
