@@ -68,6 +68,7 @@ _CASSIE = tuple(
 )
 # At 0 its legs are too short by 18 mm; so the foot stands under the hip.
 _WL16 = ('motor_4=0.023', 'motor_1=0.019', 'motor_2=0.023', 'motor_3=0.14', 'motor_5=0.039')
+_PISTONS = tuple(f'piston{leg}_prismatic_joint' for leg in range(1, 7))
 _SPRINGS = ('right_spring_link_joint', 'left_spring_link_joint')
 
 ROBOTS: dict[str, dict[str, tuple[str, ...]]] = {
@@ -107,7 +108,7 @@ ROBOTS: dict[str, dict[str, tuple[str, ...]]] = {
         'orbita_mujoco/robot.xml': (),
     },
     'KennyVilella/excavator_simulator_mujoco': {'model/excavator/excavator.xml': ()},
-    's-ritwik/Gazebo_stewart_platform': {'models/stewart/stewart_sdf.sdf': ()},
+    's-ritwik/Gazebo_stewart_platform': {'models/stewart/stewart_sdf.sdf': _PISTONS},
     'ROAM-Lab-ND/generalized_rbda': {
         'robot-models/four_bar.urdf': (),
         'robot-models/planar_leg_linkage.urdf': (),

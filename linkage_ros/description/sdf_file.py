@@ -23,8 +23,10 @@ from linkage_ros.description.robot_graph import GraphJoint, RobotGraph, WORLD
 from linkage_ros.description.robot_pose import frame_of
 from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import (
+    cross,
     direction_of,
     GROUND_FRAME,
+    length,
     Limits,
     NO_LIMITS,
     SpaceFrame,
@@ -43,6 +45,9 @@ _NONE = (0.0, 0.0, 0.0)
 
 _JOINT_AXES_SINCE = 1.5
 """Version since which axes are in the frame of the joint, unless they say otherwise."""
+
+_PARALLEL = 1e-6
+"""Sine of the angle between axes that CAD rounds to parallel ones."""
 
 _NO_LIMIT = 1e15
 """Bounds beyond it, in [rad] or [m], are none, as SDF has it."""
@@ -155,19 +160,15 @@ class _SdfReader:
             self._link_of(_text(part, end), where, end, links) for end in ('parent', 'child')
         )
         own = self._frame(name)
-        axes = [
-            self._read_axis(axis, own, where)
-            for axis in map(part.find, ('axis', 'axis2'))
-            if axis is not None
-        ]
-        needed = {'ball': 0, 'fixed': 0, 'universal': 2}.get(_KINDS[kind], 1)
-        if len(axes) < needed:
-            self._refuse(where, f'has {len(axes)} axes', f'write {needed}: <axis>')
-        first, second = [*axes, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)][:2]
+        axis = part.find('axis')
+        first, second = (
+            self._read_axis(found, own, where) for found in (axis, part.find('axis2'))
+        )
+        if _KINDS[kind] == 'universal' and length(cross(first, second)) < _PARALLEL:
+            remedy = 'write an <axis2> across the first; it is 0 0 1 where none is written'
+            self._refuse(where, 'its two axes are parallel', remedy)
         limits, follows = NO_LIMITS, None
-        if needed == 1:
-            axis = part.find('axis')
-            assert axis is not None
+        if _KINDS[kind] in ('revolute', 'continuous', 'prismatic') and axis is not None:
             limits = self._read_limits(axis.find('limit'), where)
             follows = self._read_mimic(axis.find('mimic'), where)
         return GraphJoint(
@@ -186,7 +187,9 @@ class _SdfReader:
             self._refuse(where, f'its {end} {quote(name)} is not a link', remedy)
         return name
 
-    def _read_axis(self, axis: ET.Element, own: SpaceFrame, where: str) -> Vector:
+    def _read_axis(self, axis: ET.Element | None, own: SpaceFrame, where: str) -> Vector:
+        """Return the direction of an axis; as SDFormat has it, z if it is left out."""
+        axis = ET.Element('axis') if axis is None else axis
         xyz = axis.find('xyz')
         x, y, z = self._numbers('0 0 1' if xyz is None else xyz.text, where, 3)
         if (x, y, z) == _NONE:

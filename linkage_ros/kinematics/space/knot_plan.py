@@ -136,23 +136,35 @@ class KnotPlanner:
         names = sorted(frozenset().union(*(joints for _, joints in rods)))
         slopes = [self._slopes(rod, names) for rod, _ in rods]
         supports = list(dict.fromkeys(joints for _, joints in rods))
+
+        def closing_rods(joints: frozenset[str]) -> list[PlannedRod]:
+            """Return as many independent rods as there are joints; none if there are fewer."""
+            own = [number for number, (_, moved) in enumerate(rods) if moved <= joints]
+            columns = [number for number, name in enumerate(names) if name in joints]
+            if len(own) < len(joints):
+                return []
+            chosen = _independent_rows([[slopes[n][k] for k in columns] for n in own])
+            return [rods[own[n]][0] for n in sorted(chosen)] if len(chosen) == len(joints) else []
+
         number = count()
         waiting = [(len(joints), next(number), joints) for joints in sorted(supports, key=len)]
         seen = set(supports)
         while waiting:
-            size, _, joints = heappop(waiting)
-            own = [number for number, (_, moved) in enumerate(rods) if moved <= joints]
-            columns = [number for number, name in enumerate(names) if name in joints]
-            if len(own) >= size:
-                chosen = _independent_rows([[slopes[n][k] for k in columns] for n in own])
-                if len(chosen) == size:
-                    return self._make_plan(joints, [rods[own[n]][0] for n in sorted(chosen)])
+            *_, joints = heappop(waiting)
+            if closing := closing_rods(joints):
+                return self._make_plan(joints, closing)
             for other in supports:
                 union = joints | other
                 if other & joints and union not in seen and len(seen) < _MOST_SETS:
                     seen.add(union)
                     heappush(waiting, (len(union), next(number), union))
-        return None
+        # None of the small sets: all joints together, and then without each that can be left out.
+        joints = frozenset(names)
+        for name in names if closing_rods(joints) else ():
+            less = frozenset().union(*(moved for moved in supports if moved <= joints - {name}))
+            joints = less if closing_rods(less) else joints
+        closing = closing_rods(joints)
+        return self._make_plan(joints, closing) if closing else None
 
     def _make_plan(self, joints: frozenset[str], rods: list[PlannedRod]) -> KnotPlan:
         needed = {link for rod in rods for end in rod[:2] for link in self._chain(end.link)}

@@ -284,3 +284,88 @@ def test_hinge_closed_group_solves_and_inverts(name, unknown):
         back = other.close_unlimited(*(position[joint] for joint in other.input_names))
         for joint, value in zip(closure.input_names, inputs, strict=True):
             assert back[joint] == pytest.approx(value, abs=1e-13)
+
+
+def hexapod_on_offset_joints(rng):
+    """
+    Return the hinges and slides of six legs, in any order: name to parent, child, place, axis.
+
+    Each leg is a hinge, a universal joint beside it, a strut that may spin, and the same again.
+    The dimensions are those of a published model of a Stewart platform.
+    """
+    hinges, slides = {}, {}
+    for leg in range(6):
+        side = 1.0 if leg % 2 else -1.0
+        ends, tangents = [], []
+        for radius, degrees, height in ((1.8, 30.0, 0.0), (1.44, 45.0, 2.0)):
+            angle = tau / 3 * (leg // 2) + side * np.radians(degrees)
+            ends.append(np.array([radius * np.cos(angle), radius * np.sin(angle), height]))
+            tangents.append(np.array([-np.sin(angle), np.cos(angle), 0.0]))
+        low, high = ends[0] + [0.0, 0.0, 0.075], ends[1] - [0.0, 0.0, 0.075]
+        along = high - low
+        across = np.cross(along, np.cross([0.0, 0.0, 1.0], along))
+        base, cross, cylinder, rod, fork, end = (
+            f'{part}{leg}' for part in ('base', 'cross', 'cylinder', 'rod', 'fork', 'end')
+        )
+        hinges |= {
+            f'a{leg}': ('ground', base, ends[0], tangents[0]),
+            f'b{leg}': (base, cross, low, across),
+            f'c{leg}': (cross, cylinder, low, along),
+            f'd{leg}': (rod, fork, high, along),
+            f'e{leg}': (fork, end, high, across),
+            f'f{leg}': (end, 'platform', ends[1], tangents[1]),
+        }
+        slides[f'p{leg}'] = cylinder, rod, low, along
+    names = [*hinges]
+    rng.shuffle(names)
+    return {name: hinges[name] for name in names}, slides
+
+
+def six_legs_text(hinges, slides):
+    """Return a linkage file."""
+
+    def numbers(vector):
+        return [round(float(value), 6) for value in vector]
+
+    lines = ['points: {}', 'hinges:']
+    for name, (parent, child, at, axis) in hinges.items():
+        where = f'at: {numbers(at)}, axis: {numbers(axis)}'
+        lines.append(f'  {name}: {{parent: {parent}, child: {child}, {where}}}')
+    lines.append('slides:')
+    for name, (parent, child, _, axis) in slides.items():
+        lines.append(f'  {name}: {{parent: {parent}, child: {child}, axis: {numbers(axis)}}}')
+    return '\n'.join((*lines, f'input: [{", ".join(slides)}]', ''))
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize('seed', range(4))
+def test_hexapod_is_solved_in_any_order_of_its_joints(tmp_path, seed):
+    """Each leg alone places the platform, by the library's rotations: all at the same place."""
+    hinges, slides = hexapod_on_offset_joints(Random(seed))
+    file = tmp_path / 'six_legs.yaml'
+    file.write_text(six_legs_text(hinges, slides))
+    closure = load(file)
+    pose = closure.linkage.pose.inputs
+    for inputs in random_inputs(closure, 10, 0.5):
+        position = closure.position(*inputs)
+        assert position.status is Status.CLOSED
+        values = dict.fromkeys(hinges, 0.0)
+        values |= dict(zip(closure.joint_names, position.joints, strict=True))
+        values |= {
+            f'p{leg}': x - start for leg, (x, start) in enumerate(zip(inputs, pose, strict=True))
+        }
+        places = []
+        for leg in range(6):
+            turn, origin = Rotation.identity(), np.zeros(3)
+            for joint in 'abcpdef':
+                *_, at, axis = (hinges | slides)[f'{joint}{leg}']
+                at, axis = np.round(at, 6), np.round(axis, 6)
+                way, value = axis / np.linalg.norm(axis), values[f'{joint}{leg}']
+                if joint == 'p':
+                    origin = origin + turn.apply(way * value)
+                    continue
+                origin = origin + turn.apply(at)
+                turn = turn * Rotation.from_rotvec(way * value)
+                origin = origin - turn.apply(at)
+            places.append([*origin, *turn.as_matrix().ravel()])
+        assert places == pytest.approx(np.array([places[0]] * 6), abs=1e-11)

@@ -45,6 +45,18 @@ def test_sdf_robot_has_the_states_of_the_urdf():
     assert 'm2' not in limits  # 1e16 is none
 
 
+def test_sdf_axis_that_is_left_out_is_z(tmp_path):
+    """As in joint.sdf of SDFormat 1.7: neither <axis> nor <axis2> is required, xyz is 0 0 1."""
+    text = (ROBOTS / 'ankle.sdf').read_text('utf-8')
+    robots = []
+    for second in ('<axis2><xyz>0 0 1</xyz></axis2>', ''):
+        robot = tmp_path / 'robot.sdf'
+        robot.write_text(text.replace('<axis2><xyz>1 0 0</xyz></axis2>', second))
+        robots.append(read_as_urdf(robot))
+    assert robots[0] == robots[1]
+    assert robots[0] != read_as_urdf(ROBOTS / 'ankle.sdf')
+
+
 def test_sdf_frame_chain_of_1500_is_resolved(tmp_path):
     frames = ''.join(
         f'<frame name="f{k}"><pose relative_to="f{k + 1}">1e-4 0 0 0 0 0</pose></frame>'
@@ -268,6 +280,9 @@ REFUSED = {
                           'r.sdf: no joint leads from world to c; write a joint of type fixed'),
     'no axis': ('r.sdf', SDF.format(LINK + HINGE.replace('0 0 1', '0 0 0')),
                 'r.sdf: joint j: its axis is 0 0 0; write 0 0 1, for example'),
+    'universal axes in line': ('r.sdf', SDF.format(LINK + HINGE.replace('revolute', 'universal')),
+                               ('r.sdf: joint j: its two axes are parallel; write an <axis2> '
+                                'across the first; it is 0 0 1 where none is written')),
     'another file': ('r.xml', BODY.format('<include file="/etc/passwd"/>'),
                      ('r.xml: has an element <include>; write a plain file: mj_saveLastXML')),
     'bodies by number': ('r.xml', BODY.format('<worldbody><replicate count="3"/></worldbody>'),
