@@ -11,6 +11,7 @@
 from collections import defaultdict
 from collections.abc import Generator, Iterator
 import gc
+from importlib.util import find_spec
 from math import inf
 import re
 from typing import Any
@@ -24,6 +25,9 @@ from .support.missing_packages import missing_package
 from .support.sampling import choose_covering, EXAMPLES, TAKES_ALL
 
 _skipped: set[str] = set()
+
+# A conftest that misses a package ends the collection, and that of bags needs this one.
+collect_ignore = [] if find_spec('rosbags') else ['bag']
 
 # A property is not judged by the duration of an example.
 settings.register_profile(
