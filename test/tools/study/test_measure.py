@@ -10,6 +10,7 @@
 
 from importlib import import_module
 from math import cos, inf, sin
+import re
 
 from linkage_ros.bag import BagWriter, Topic
 from linkage_ros.description import load_scene
@@ -173,6 +174,23 @@ def test_slow_settings_are_left_out_and_listed(tmp_path, monkeypatch, seconds):
     assert {each.label for each in knob.settings} == {*measured}
     told = '; '.join(without)
     assert left_out == ([f'for lack of time: {told}'] if without else [])
+
+
+def test_quick_measurement_says_what_it_had_no_time_for(monkeypatch):
+    """The bounds of processor time are passed before anything is compared or priced."""
+    monkeypatch.setattr(import_module('linkage_ros.tools.study.solving'), '_QUICK_COMPARED', -1.0)
+    monkeypatch.setattr(import_module('linkage_ros.tools.study.measure'), '_QUICK_PRICES', 0.0)
+    budget = measure_budget(
+        load_scene('demo'), horizon=0.2, like='sine', quick=True, parts=[ERRORS]
+    )
+    (solving,) = (knob for knob in budget.knobs if knob.name == 'solving')
+    assert [each.label for each in solving.settings] == ['closed form']
+    assert solving.note == 'other methods are left out for lack of time'
+    counted = [
+        re.fullmatch(r'for lack of time: (\d+) settings farther .*', said)
+        for said in budget.left_out
+    ]
+    assert sum(int(found[1]) for found in counted if found) > 0
 
 
 def test_solver_comparison_orders_errors_as_expected():
