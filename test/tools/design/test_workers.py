@@ -49,7 +49,9 @@ def cluster_of(count, **options):
 
 @pytest.fixture(scope='module')
 def cluster():
-    with cluster_of(2) as cluster:
+    # On a busy machine a worker that died takes long to be replaced.
+    with pytest.MonkeyPatch.context() as patch, cluster_of(2) as cluster:
+        patch.setattr(dask_workers, '_PATIENCE', 60.0)
         yield cluster
 
 
