@@ -251,6 +251,9 @@ def _poles(
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low[0] + high[0])
             value = evaluate(middle)[0]
+            if not isfinite(value):  # The pole itself is in the middle
+                middle = low[0] + 0.307 * (high[0] - low[0])
+                value = evaluate(middle)[0]
             if middle in (low[0], high[0]) or not isfinite(value):
                 break
             if (value - low[1]) * slope < 0.0:

@@ -269,6 +269,25 @@ def test_crank_limits_around_a_pole_split_the_branches(limits, ends):
     assert not any(any(branch.turns_back) for branch in branches)
 
 
+@pytest.mark.parametrize('share', [*(k / 16 for k in range(1, 16)), 0.5 + 1 / 1440, 1 / 3])
+def test_pole_at_a_sample_or_between_two_splits_the_branches(share):
+    """Where limits lie about the pole at 0 as searches divide a range, one meets it exactly."""
+    rng = random.Random(str(share))
+    for _ in range(4):
+        width = rng.randrange(2, 49) / 16
+        limits = Limits(-share * width, width - share * width)
+        closure = tangent_mechanism(limits)
+        for joint in ('shoe_slide', 'slot_slide'):
+            ends = [(one.least, one.most) for one in closure.branches(joint)]
+            assert any(most == pytest.approx(0.0, abs=1e-5) for _, most in ends), (joint, limits)
+            assert any(least == pytest.approx(0.0, abs=1e-5) for least, _ in ends), (joint, limits)
+        for slide in (rng.uniform(-3.0, 3.0), *(1.0 / tan(limits.low * x) for x in (0.1, 0.9))):
+            right = [atan2(1.0, slide), atan2(1.0, slide) - pi]
+            right = [crank for crank in right if limits.low < crank < limits.high]
+            cranks = [crank for _, crank in closure.cranks('shoe_slide', slide)]
+            assert cranks == pytest.approx(right, abs=1e-14), (slide, limits)
+
+
 def test_returning_slide_ends_its_branches_at_poles():
     """The slot's slide is 1/sin(crank): it comes back on the side on which it went."""
     closure = tangent_mechanism(Limits(0.5, 6.0))
