@@ -17,7 +17,7 @@ the units of the linkage file; JSON has SI units.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 import sys
 from threading import Event
@@ -222,9 +222,7 @@ def _exchanged_table(
     ]
     option = ' '.join(f'--joint {name}={typed:g}' for name, typed in arguments.joint)
     if searched.inputs and not within:
-        beyond = closure.limit_exceeded(closure.position(*searched.inputs[0]))
-        reason = f'is reached only beyond limits: {beyond}'
-        raise LinkageError(option, reason, 'ask for another value, or widen the limits')
+        raise _beyond_error(option, closure, searched.inputs)
     if not within:
         reach = []
         for name, ends in searched.reach.items():
@@ -289,15 +287,22 @@ def _unreached_error(
 ) -> LinkageError:
     """Return the error for a value of a joint that no input within the limits reaches."""
     free = closure.branches(joint, limited=False)
-    for branch in free:
-        if not branch.distance_beyond(value):
-            beyond = closure.limit_exceeded(closure.position(branch.find_crank(value)[0]))
-            reason = f'is reached only beyond limits: {beyond}'
-            return LinkageError(option, reason, 'ask for another value, or widen the limits')
+    cranks = [branch.find_crank(value)[0] for branch in free if not branch.distance_beyond(value)]
+    if cranks:
+        return _beyond_error(option, closure, [(crank,) for crank in cranks])
     within = closure.branches(joint)
     ends = min(branch.low for branch in within), max(branch.high for branch in within)
     low, high = (angles.value_text(end, free[0].turning) for end in ends)
     return LinkageError(option, 'is not reached', f'{joint} goes from {low} to {high}')
+
+
+def _beyond_error(
+    option: str, closure: Closure, states: Iterable[tuple[float, ...]]
+) -> LinkageError:
+    """Return the error for joints whose values are reached at inputs beyond limits only."""
+    beyond = dict.fromkeys(closure.limit_exceeded(closure.position(*inputs)) for inputs in states)
+    reason = f'is reached only beyond limits: {" or ".join(beyond)}'
+    return LinkageError(option, reason, 'ask for another value, or widen the limits')
 
 
 def _show_reach(

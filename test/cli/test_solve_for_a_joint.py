@@ -13,9 +13,10 @@ from __future__ import annotations
 from cmath import phase, rect
 import csv
 import io
-from math import acos, radians, remainder, tau
+from math import acos, atan2, pi, radians, remainder, tau
 from pathlib import Path
 from random import Random
+import re
 
 from linkage_ros import load
 from linkage_ros.cli.main import main
@@ -98,6 +99,35 @@ def test_solve_refuses_unreachable_values_of_joints(
             assert line.startswith(f'linkage solve: --joint {joints[0]}=')
             assert ': is not reached' in line
     assert 2 in seen
+
+
+TANGENT = """
+links:
+  ground: {O: [0, 0], G: [0, 1]}
+  crank: {O: [0, 0], X: [1, 0]}
+  shoe: {P: [0, 0], Q: [0.2, 0]}
+sliders:
+  rail: {point: P, block: shoe, along: ground, through: G, direction: [1, 0]}
+  slot: {point: P, along: crank, through: O, direction: [1, 0]}
+input: {joint: crank_joint, parent: ground, child: crank, limits: [-0.1, 0.1]}
+joints: {shoe_slide: {slider: rail}}
+"""
+"""A shoe slides on a rail at height 1, by a pin in the slot of the crank: its slide is 1/tan."""
+
+
+def test_solve_names_every_crank_beyond_limits(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'tangent.yaml').write_text(TANGENT)
+    random = Random(48)
+    for _ in range(8):
+        slide = round(random.uniform(-3.0, 3.0), 3)
+        typed = ['--joint', f'shoe_slide={slide}', '--radians']
+        assert main(['solve', str(tmp_path / 'tangent.yaml'), *typed]) == 2
+        said = capsys.readouterr().err
+        cranks = [float(found) % tau for found in re.findall(r'crank_joint at (\S+) rad', said)]
+        right = atan2(1.0, slide)
+        assert sorted(cranks) == pytest.approx([right, right + pi], abs=1e-5)
 
 
 def three_arms() -> str:
