@@ -115,19 +115,26 @@ def test_compare_refuses_bags_without_joints_in_common(tmp_path, values, topic, 
         answer(compare, first, second)
 
 
-def test_difference_curve_breaks_at_missing_joint_states(tmp_path, monkeypatch):
+@pytest.mark.parametrize('gap_first', [True, False])
+def test_missing_joint_states_of_either_run_are_not_compared(
+    tmp_path, monkeypatch, capsys, gap_first
+):
     pytest.importorskip('matplotlib')
     first = bag(tmp_path / 'a', {'p': swing}, seconds=1.0)
-    more = bag(tmp_path / 'c', {'p': swing}, begin=8, seconds=1.0)
+    more = bag(tmp_path / 'c', {'p': lambda t: swing(t + 3.0)}, begin=8, seconds=1.0)
     messages = [*read_bag(first).messages(), *read_bag(more).messages()]
     writer = BagWriter(tmp_path / 'gap', [Topic('/joint_states', JOINT_STATE, '', '')])
     for _, log_time, publish_time, data in messages:
         writer.write(0, log_time, publish_time, data)
     writer.close()
-    second = bag(tmp_path / 'b', {'p': lambda t: swing(t) + 0.25}, seconds=5.0)
+    second = bag(tmp_path / 'b', {'p': lambda t: swing(t) + 0.25}, seconds=4.0)
+    runs = (tmp_path / 'gap', second) if gap_first else (second, tmp_path / 'gap')
+    account, rows = told(capsys, *runs)
+    assert account['compared'] == pytest.approx(2 * 101, abs=1)
+    assert rows['p']['greatest'] == pytest.approx(0.25)
     figures = []
     monkeypatch.setattr(compare, 'save_picture', lambda figure, _: figures.append(figure))
-    assert answer(compare, tmp_path / 'gap', second, '-o', tmp_path / 'x.png') == 0
+    assert answer(compare, *runs, '-o', tmp_path / 'x.png') == 0
     ((axes,),) = [figure.axes for figure in figures]
     assert axes.get_ylabel() == 'difference of joint angle [°]'
     (line,) = axes.get_lines()

@@ -56,6 +56,7 @@ from linkage_ros.tools.drawing.plot_command import (
     crank_curves as crank_curves,
     curves_over_time as curves_over_time,
     is_after_gap as is_after_gap,
+    longest_step as longest_step,
 )
 from linkage_ros.tools.drawing.reach import reach_lines as reach_lines
 from linkage_ros.tools.drawing.space_drawing import (

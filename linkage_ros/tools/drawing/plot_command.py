@@ -190,9 +190,15 @@ def is_after_gap(times: Floats, *, steady: bool) -> Bools:
     The times are in [s]. Ticks that are not ``steady`` come with samples, at any times.
     """
     steps = np.diff(times)
-    longest = (_STEADY if steady else _UNSTEADY) * float(np.median(steps)) if len(steps) else 0.0
     # Where the clock was set back, another part of the run begins.
-    return np.concatenate([[False], (steps > longest) | (steps < 0.0)])
+    gaps = (steps > longest_step(times, steady=steady)) | (steps < 0.0)
+    return np.concatenate([[False], gaps])
+
+
+def longest_step(times: Floats, *, steady: bool) -> float:
+    """Return the longest time between two joint states with no gap between them."""
+    steps = np.diff(times)
+    return (_STEADY if steady else _UNSTEADY) * float(np.median(steps)) if len(steps) else 0.0
 
 
 def curves_over_time(

@@ -10,13 +10,14 @@
 Compare two runs: the differences of their joints over the time, in numbers and as a picture.
 
 The runs begin at their first joint states. The second is interpolated at the times of the first,
-as long as both last. A difference is not a failure.
+as long as both last, but not where states of it are missing. A difference is not a failure.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
+from itertools import chain, islice
 from math import nan, pi, remainder, tau
 from pathlib import Path
 from threading import Event
@@ -45,6 +46,7 @@ from linkage_ros.replay import Deviation, recorded_scene, TickPlace, turning_joi
 from linkage_ros.tools.drawing import (
     is_after_gap,
     label_joints,
+    longest_step,
     picture_settings,
     plot_joints,
     save_picture,
@@ -236,13 +238,18 @@ def _read_states(bag: Bag, messages: Iterator[Any]) -> Iterator[TimedState]:
 def _compare_states(
     differences: BagDifferences, first: Iterator[TimedState], second: Iterator[TimedState]
 ) -> None:
+    begin = [*islice(second, _ROWS)]
+    longest = longest_step(np.array([state.time for state in begin], float), steady=False)
+    second = chain(begin, second)
     before = after = next(second, None)
     for time, values in first:
         while after is not None and after.time < time:
             before, after = after, next(second, None)
         if before is None or after is None:
             return
-        differences.add_states(time, values, differences.interpolate(before, after, time))
+        # Nothing is known within a gap of the second run.
+        if after.time == time or after.time - before.time <= longest:
+            differences.add_states(time, values, differences.interpolate(before, after, time))
 
 
 def _draw_differences(
