@@ -9,6 +9,7 @@
 # Read first: measure_budget, Budget, Price, Knob, NeedAnswer, Setting, measure_age_in_use,
 # measure_drive_step, measure_deliberate, measure_solving, price_scenes, motions_of, budget_table.
 
+from linkage_ros.tools.study.accuracy_command import budget_html as budget_html
 from linkage_ros.tools.study.age import (
     CARRY as CARRY,
     errors_in_use as errors_in_use,
@@ -72,8 +73,11 @@ from linkage_ros.tools.study.member_motion import (
     draw_ticks as draw_ticks,
     draw_times as draw_times,
 )
-from linkage_ros.tools.study.need import answer_need as answer_need, answers_of as answers_of
-from linkage_ros.tools.study.page import budget_html as budget_html
+from linkage_ros.tools.study.need import (
+    answer_need as answer_need,
+    answers_of as answers_of,
+    tune_scene as tune_scene,
+)
 from linkage_ros.tools.study.picture import budget_svg as budget_svg
 from linkage_ros.tools.study.prices import (
     add_prices as add_prices,
@@ -92,4 +96,3 @@ from linkage_ros.tools.study.solving import (
     HardCase as HardCase,
     measure_solving as measure_solving,
 )
-from linkage_ros.tools.study.tuned_scene import tune_scene as tune_scene

@@ -17,7 +17,8 @@ it was recorded. docs/accuracy/method.md says how it is measured.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from html import escape
 from pathlib import Path
 from threading import Event
 from typing import NamedTuple
@@ -46,14 +47,14 @@ from linkage_ros.tools.study.budget_text import (
     lead_lines,
 )
 from linkage_ros.tools.study.measure import EFFECTS, measure_budget, PARTS, RECORDING
-from linkage_ros.tools.study.need import answer_need, answers_of
-from linkage_ros.tools.study.page import budget_html
+from linkage_ros.tools.study.need import answer_need, answers_of, tune_scene
 from linkage_ros.tools.study.picture import budget_svg
-from linkage_ros.tools.study.tuned_scene import tune_scene
+from linkage_ros.tools.view.pages import facts_html, html_document, table_html
 
 EXAMPLE = 'linkage accuracy slider_crank --need 1e-3 --quick'
 
 _SHOWN = ('.html', '.svg')
+_HERE = 'linkage_ros.tools.study'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -219,3 +220,34 @@ def _write_file(
         if not svg:
             raise LinkageError(file, 'shows errors, and none were measured', 'leave -o out')
         atomic_write(file, svg.encode())
+
+
+def budget_html(budget: Budget, answers: Sequence[NeedAnswer]) -> str:
+    """
+    Return the page.
+
+    The answers are those to all needs that differ, from the greatest error to the least; the last
+    one is to a need that nothing meets. Its field shows the first that reaches what is typed.
+    """
+    data = {'answers': [{'error': each.error, 'text': each.text} for each in answers]}
+    body = _page_body(budget, has_field=bool(answers))
+    title = f'Accuracy of {budget.scene}'
+    return html_document(title, body, data, _HERE, ('page.css', 'page.js'), has_plots=False)
+
+
+def _page_body(budget: Budget, *, has_field: bool) -> Iterator[str]:
+    yield f'<header><h1>Accuracy of {escape(budget.scene)}</h1>'
+    yield from (f'<p class="lead">{escape(line)}</p>' for line in lead_lines(budget))
+    yield '</header><main>'
+    if has_field:
+        yield '<p class="field" hidden><label>I need <input id="need" value="0.001" size="8" '
+        yield 'inputmode="decimal"> rad</label> <output id="answer" for="need"></output></p>'
+    picture = budget_svg(budget)
+    if picture:
+        yield f'<figure><figcaption>Error against cost</figcaption>{picture}</figure>'
+    title = 'Where the error comes from, and what each setting costs'
+    yield from table_html(budget_table(budget)._replace(title=title))
+    yield from (f'<p class="note">{escape(line)}</p>' for line in closing_lines(budget))
+    yield '</main><footer>'
+    yield from facts_html(budget.machine)
+    yield '</footer>'

@@ -30,7 +30,6 @@ from linkage_ros.description import HIGHEST_RATE, LOWEST_RATE, Scene
 from linkage_ros.messages import CrankSample, JointStateWriter, NANOSECONDS
 from linkage_ros.stages.drives import sample_inputs, TopicDrive
 from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
-from linkage_ros.tools.study.joint_errors import error_of, joint_distances, joints_at
 from linkage_ros.tools.study.measuring import Candidate, Spread, time_in_turn
 from linkage_ros.tools.study.member_motion import (
     BEGIN,
@@ -39,6 +38,9 @@ from linkage_ros.tools.study.member_motion import (
     draw_instants,
     draw_ticks,
     draw_times,
+    error_of,
+    joint_distances,
+    joints_at,
     LinkageMotion,
     scene_key,
 )

@@ -108,7 +108,7 @@ def neighbours_of(budget: Budget, knob: Knob) -> Neighbours:
     """Return the next cheaper and the next better setting of a knob."""
     own = knob.own_setting
     others = [each for each in knob.settings if each is not own and each.instruction]
-    cheaper = [each for each in others if _more_core(budget, knob, each) < 0.0]
+    cheaper = [each for each in others if added_core(budget, knob, each) < 0.0]
     better = [each for each in others if each.error.worst < _SAME * own.error.worst]
     return Neighbours(
         min(cheaper, key=lambda each: each.error.worst, default=None),
@@ -116,8 +116,8 @@ def neighbours_of(budget: Budget, knob: Knob) -> Neighbours:
     )
 
 
-def _more_core(budget: Budget, knob: Knob, setting: Setting) -> float:
-    """Return what the scene takes of a core more with a setting; 0 within noise."""
+def added_core(budget: Budget, knob: Knob, setting: Setting) -> float:
+    """Return what a scene takes of a core more with a setting; 0 within noise and for its own."""
     price = setting.price
     if price is None or (price.is_noise and price.rate == budget.rate):
         return 0.0
@@ -126,7 +126,7 @@ def _more_core(budget: Budget, knob: Knob, setting: Setting) -> float:
 
 def _setting_effort(budget: Budget, knob: Knob, setting: Setting) -> tuple[float, int, float]:
     """Return how much a more exact setting asks for: cost, then keys. That it saves is no gain."""
-    more = max(0.0, _more_core(budget, knob, setting))
+    more = max(0.0, added_core(budget, knob, setting))
     return more, len(setting.changes or ()), setting.error.worst
 
 

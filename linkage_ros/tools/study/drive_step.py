@@ -32,13 +32,15 @@ from linkage_ros.errors import DefinitionError
 from linkage_ros.messages import NANOSECONDS
 from linkage_ros.stages.drives import TorqueDrive
 from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
-from linkage_ros.tools.study.joint_errors import error_of, joint_distances, joints_at
 from linkage_ros.tools.study.measuring import Candidate, Progress, time_in_turn
 from linkage_ros.tools.study.member_motion import (
     build_drive,
     Crank,
     cranks_at,
     draw_ticks,
+    error_of,
+    joint_distances,
+    joints_at,
     LinkageMotion,
     refuse_horizon,
 )

@@ -25,9 +25,8 @@ from linkage_ros.tools.study.budget import Budget, Knob, RecordingLoss, Setting
 from linkage_ros.tools.study.deliberate import measure_deliberate
 from linkage_ros.tools.study.measuring import describe_machine, Progress
 from linkage_ros.tools.study.member_motion import cranks_at, LinkageMotion, scene_key
-from linkage_ros.tools.study.motion_feed import feed_of
 from linkage_ros.tools.study.prices import add_prices, change_scene, Feed, tick_price, USUAL_RATE
-from linkage_ros.tools.study.scene_motion import motions_of
+from linkage_ros.tools.study.scene_motion import feed_of, motions_of
 
 ERRORS, EFFECTS, RECORDING = 'errors', 'effects', 'recording'
 PARTS = (ERRORS, EFFECTS, RECORDING)

@@ -10,17 +10,31 @@
 The cheapest settings whose errors together do not exceed a need.
 
 Errors of different sources are added at their worst: all at once and in one direction. So what is
-said to meet a need does. Prices add up, too; one within noise costs nothing.
+said to meet a need does. Prices add up, too; one within noise costs nothing. The answer is also
+the scene's file with other keys, to be written into any folder.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import product
-from typing import NamedTuple
+import os
+from pathlib import Path
+from typing import Any, NamedTuple
 
+from linkage_ros.description import (
+    apply_settings,
+    kind_of,
+    parse_yaml,
+    read_yaml,
+    Scene,
+    SCENE_FILE,
+)
+from linkage_ros.errors import FileError
+from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 from linkage_ros.tools.study.budget import Budget, Knob, NeedAnswer, Setting
-from linkage_ros.tools.study.budget_text import error_text, share_text
+from linkage_ros.tools.study.budget_text import added_core, error_text, share_text
+from linkage_ros.tools.study.prices import Change, settings_of
 
 _ROUNDED = 1.0 + 1e-9
 
@@ -64,7 +78,7 @@ def _best_choices(budget: Budget) -> list[_SettingChoice]:
     choices = []
     for settings in product(*(_candidate_settings(budget, knob) for knob in knobs)):
         pairs = [*zip(knobs, settings, strict=True)]
-        cost = budget.tick.core_share + sum(_added_cost(budget, *pair) for pair in pairs)
+        cost = budget.tick.core_share + sum(added_core(budget, *pair) for pair in pairs)
         changed = sum(setting is not knob.own_setting for knob, setting in pairs)
         error = sum(setting.error.worst for setting in settings)
         choices.append(_SettingChoice(cost, changed, error, settings))
@@ -85,22 +99,12 @@ def _candidate_settings(budget: Budget, knob: Knob) -> Iterator[Setting]:
     least = float('inf')
     ranked = sorted(
         asked,
-        key=lambda s: (_added_cost(budget, knob, s), s is not knob.own_setting, s.error.worst),
+        key=lambda s: (added_core(budget, knob, s), s is not knob.own_setting, s.error.worst),
     )
     for setting in ranked:
         if setting is knob.own_setting or setting.error.worst < least:
             least = min(least, setting.error.worst)
             yield setting
-
-
-def _added_cost(budget: Budget, knob: Knob, setting: Setting) -> float:
-    """Return what a setting takes of a core more than the scene's own; 0 within noise."""
-    price = setting.price
-    if setting is knob.own_setting or price is None:
-        return 0.0
-    if price.is_noise and price.rate == budget.rate:
-        return 0.0
-    return budget.core_of(knob, setting) - budget.tick.core_share
 
 
 def _met_answer(budget: Budget, choice: _SettingChoice, before: str) -> NeedAnswer:
@@ -132,3 +136,49 @@ def _unmet_answer(budget: Budget, choices: Sequence[_SettingChoice], before: str
         f'{error_text(setting.error.worst)} rad with {setting.label}'
     )
     return NeedAnswer(False, best.error, [], text)
+
+
+def tune_scene(
+    scene: Scene, named: str | os.PathLike[str], changes: Sequence[Change], folder: Path
+) -> bytes:
+    """
+    Return the file of a scene with changed keys, to be written into a folder.
+
+    The scene has what was set for it already; ``named`` is what it was loaded from: a scene file,
+    a linkage file, or a name. Paths of linkages and bags lead from the folder.
+    """
+    content = parse_yaml(scene.files[SCENE_FILE], scene.name)
+    scene_mapping: Any = content.mapping
+    file = named_file(named, 'scenes', 'linkages')
+    if kind_of(read_yaml(file)[0]) == 'linkage':
+        scene_mapping['linkage'] = _path_from(folder, file)
+    else:
+        for within, key in _path_entries(scene_mapping):
+            path = file.parent / within[key]
+            if key == 'linkage':
+                path = linkage_of_scene(within[key], file.parent)
+            within[key] = _path_from(folder, path)
+    return apply_settings(content, settings_of(changes))
+
+
+def _path_entries(scene: Any) -> Iterator[tuple[Any, str]]:
+    """Yield the mappings of a scene that hold the path of a file, with its key."""
+    entries = scene.get('linkages') or []
+    for entry in (scene, *(entries if isinstance(entries, list) else entries.values())):
+        if 'linkage' in entry:
+            yield entry, 'linkage'
+        drive = entry.get('drive') or {}
+        if 'bag' in drive:
+            yield drive['bag'], 'file'
+
+
+def _path_from(folder: Path, path: Path) -> str:
+    """Return a path as a file in a folder names it; a linkage of the package by its name."""
+    try:
+        is_shipped = (
+            path.stem in linkage_names()
+            and path.resolve() == named_file(path.stem, 'linkages').resolve()
+        )
+    except FileError:
+        is_shipped = False
+    return path.stem if is_shipped else os.path.relpath(path, folder)

@@ -13,7 +13,8 @@ The exact joints are from `linkage_ros.tools.study.enclosure`: balls that are pr
 the solution. The states are from the scene's own motion. What a scene cannot ask for stands
 beside the closed form for comparison: numbers of 32 bits, the textbook form, Newton's method, a
 spline through a table, thirty digits; and of links that close only together the steps of Newton's
-method, and the size of the cells that these start from.
+method, and the size of the cells that these start from. Newton's method is on the constraint
+equations, in the places and turns of the links: it shares no formula with the closed form.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
 from math import inf, sqrt
 from time import process_time
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.description import read_linkage, read_yaml
 from linkage_ros.errors import check_installed, LinkageError
@@ -43,11 +44,12 @@ from linkage_ros.tools.study.four_bar_formulas import (
     solve_by_textbook,
     solve_in_single_precision,
 )
-from linkage_ros.tools.study.joint_errors import size_of
 from linkage_ros.tools.study.measuring import Candidate, Progress, time_in_turn
-from linkage_ros.tools.study.member_motion import cranks_at, draw_times, LinkageMotion
-from linkage_ros.tools.study.newton import solve_by_newton
+from linkage_ros.tools.study.member_motion import cranks_at, draw_times, LinkageMotion, size_of
 import numpy as np
+
+if TYPE_CHECKING:
+    from linkage_ros.tools.study.exact_constraints import ExactConstraints
 
 NAME = 'solving'
 
@@ -67,6 +69,12 @@ _BITS = 104
 
 _FAR = 0.1
 """Larger errors, in [rad], mean another pose: the method has failed."""
+
+_MOST = 50
+"""Most iterations of Newton's method; more mean no convergence."""
+
+_BEHIND = 0.01
+"""How far behind a state Newton's method starts, in [rad] or parts of the size."""
 
 DISTANCES = tuple(10.0 ** (-k / 2.0) for k in range(4, 19))
 """Distances of hard cases from a toggle or change point: 1e-2 to 1e-9."""
@@ -379,3 +387,78 @@ def _closing_states(
 ) -> tuple[list[tuple[float, ...]], list[float]]:
     kept = [o for o in offsets if closure.position(place + o).status is Status.CLOSED]
     return [(place + offset,) for offset in kept], [abs(offset) for offset in kept]
+
+
+class _RoundedConstraints:
+    """The constraints at some inputs as sums c·x_i·x_j of doubles."""
+
+    def __init__(self, exact: ExactConstraints) -> None:
+        self._exact, self._count = exact, exact.count
+        terms = [
+            (row, float(factor.mid()), i, j)
+            for row, products in enumerate(exact.constraints)
+            for (factor, *_), i, j in products
+        ]
+        rows, factors, one, other = zip(*terms, strict=True)
+        self._rows, self._factors = np.array(rows), np.array(factors)
+        self._one, self._other = np.array(one), np.array(other)
+        # The places of both derivatives of each product in the flat Jacobian.
+        width = exact.count + 1
+        self._places = np.concatenate(
+            [self._rows * width + self._one, self._rows * width + self._other]
+        )
+
+    def newton_step(self, unknowns: Any) -> Any:
+        """Return a step of Newton's method; the first unknown is 1 and stays."""
+        one, other = unknowns[self._one], unknowns[self._other]
+        errors = np.bincount(self._rows, self._factors * one * other, self._count)
+        slopes = np.concatenate([self._factors * other, self._factors * one])
+        width = self._count + 1
+        jacobian = np.bincount(self._places, slopes, self._count * width)
+        return np.linalg.solve(jacobian.reshape(-1, width)[:, 1:], errors)
+
+    def joint_values(self, unknowns: Any) -> tuple[Any, ...]:
+        """Return the published joints."""
+        return self._exact.joint_values([*map(self._exact.number, unknowns.tolist())])
+
+
+def solve_by_newton(closure: Closure, tolerance: float) -> Callable[..., Sequence[Any]]:
+    """
+    Return Newton's method from a state a little behind, as from the last tick.
+
+    It ends at a last correction of at most the tolerance, in [rad] and parts of the size. The
+    starts are kept, so a second call with the same inputs only iterates.
+    """
+    from linkage_ros.tools.study.enclosure import (
+        constraints_of,  # local import: an optional dependency
+    )
+
+    linkage = closure.linkage
+    starts: dict[tuple[float, ...], tuple[_RoundedConstraints, Any]] = {}
+
+    def start_behind(inputs: Sequence[float], exact: ExactConstraints) -> Any:
+        """Return the unknowns of the closure at inputs that differ, on the side that closes."""
+        units = [closure.scale if each.slider else 1.0 for each in linkage.inputs]
+        for side in (-_BEHIND, _BEHIND, 0.0):
+            near = [x + side * unit for x, unit in zip(inputs, units, strict=True)]
+            if closure.position(*near).joints:
+                return np.array([*map(float, exact.initial_unknowns(closure, near))])
+        raise ValueError(f'{tuple(inputs)}: the linkage does not close')
+
+    def position(*inputs: float) -> Sequence[Any]:
+        if inputs not in starts:
+            exact = constraints_of(closure, inputs)
+            starts[inputs] = _RoundedConstraints(exact), start_behind(inputs, exact)
+        constraints, start = starts[inputs]
+        unknowns = start.copy()
+        for _ in range(_MOST):
+            try:
+                step = constraints.newton_step(unknowns)
+            except np.linalg.LinAlgError:
+                return ()
+            unknowns[1:] -= step
+            if float(np.abs(step).max()) <= tolerance:
+                return constraints.joint_values(unknowns)
+        return ()
+
+    return position
