@@ -36,7 +36,7 @@ TOOLS = {
     'import': 'linkage_ros.tools.models.import_command',
     # What commands, scenes and closures ask for.
     'arrays': 'linkage_ros.tools.models.array_functions',
-    'robot_description': 'linkage_ros.tools.models.scene_model',
+    'robot_description': 'linkage_ros.tools.models.urdf',
     'spread': 'linkage_ros.tools.drawing.spread',
 }
 """The module of each tool, by its name."""

@@ -9,11 +9,11 @@
 from linkage_ros.tools.models.array_functions import make_array_functions as make_array_functions
 from linkage_ros.tools.models.mjcf import mujoco_model as mujoco_model
 from linkage_ros.tools.models.part import (
+    make_scene_model as make_scene_model,
     ModelPart as ModelPart,
     PartError as PartError,
     prefix_names as prefix_names,
 )
 from linkage_ros.tools.models.robot_model_command import model_of as model_of
-from linkage_ros.tools.models.scene_model import make_scene_model as make_scene_model
 from linkage_ros.tools.models.tree import grow_tree as grow_tree, Tree as Tree
 from linkage_ros.tools.models.urdf import add_frames as add_frames, urdf_model as urdf_model

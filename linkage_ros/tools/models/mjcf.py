@@ -37,14 +37,17 @@ from linkage_ros.kinematics import (
     usual_inputs,
 )
 from linkage_ros.tools.models.bodies import bar_width, link_bodies, LinkBody, Solid
-from linkage_ros.tools.models.mjcf_elements import DENSITY, DIFFERENCE, LEAST_INERTIA, write_limits
 from linkage_ros.tools.models.orientation import joint_spans
 from linkage_ros.tools.models.part import ModelPart, PartError, prefix_names, PrefixedNames
 from linkage_ros.tools.models.space_mjcf import SpaceBodies
 from linkage_ros.tools.models.xml import (
+    DENSITY,
+    DIFFERENCE,
     format_number,
     format_numbers,
     format_rough,
+    LEAST_INERTIA,
+    write_limits,
     xml_comment,
     xml_document,
 )

@@ -6,16 +6,17 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Linkages as parts of a robot model, and the names of frames and joints there."""
+"""Linkages as parts of a robot model, of a scene too, and the names of frames and joints there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
+from linkage_ros.description import Scene
 from linkage_ros.dynamics import Loads
 from linkage_ros.errors import DefinitionError, quote
-from linkage_ros.kinematics import Linkage, SpaceLinkage
+from linkage_ros.kinematics import Closure, Linkage, SpaceLinkage
 from linkage_ros.names import free_name
 
 
@@ -129,3 +130,26 @@ def _take_name(name: str, taken: set[str]) -> str:
     free = free_name(name, taken)
     taken.add(free)
     return free
+
+
+Write = Callable[[str, Sequence[ModelPart]], bytes]
+"""Writes the robot model of some linkages, with a name."""
+
+
+def make_scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> bytes:
+    """
+    Return the robot model of a scene, with joint names as in its messages.
+
+    The closures have the deviations of their parts; ``write`` is `urdf_model` or the writer of
+    MJCF. A FileError with a remedy is raised if a linkage cannot be a robot model.
+    """
+    parts = [
+        ModelPart(closure, scene_linkage.prefix, scene_linkage.loads, scene.wrapped)
+        for scene_linkage, closure in zip(scene.linkages, closures, strict=True)
+    ]
+    try:
+        return write(scene.name, parts)
+    except PartError as error:
+        scene_linkage = scene.linkages[error.number]
+        content = scene_linkage.linkage_content if error.of_linkage else scene_linkage.content
+        raise content.locate_error(error) from None

@@ -31,8 +31,7 @@ from linkage_ros.description import (
 )
 from linkage_ros.resources import named_file
 from linkage_ros.tools.models.mjcf import mujoco_model
-from linkage_ros.tools.models.part import ModelPart, PartError
-from linkage_ros.tools.models.scene_model import make_scene_model, Write
+from linkage_ros.tools.models.part import make_scene_model, ModelPart, PartError, Write
 from linkage_ros.tools.models.urdf import urdf_model
 
 WRITERS: dict[str, Write] = {'urdf': urdf_model, 'mjcf': mujoco_model}

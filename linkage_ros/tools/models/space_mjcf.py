@@ -38,9 +38,16 @@ from linkage_ros.kinematics import (
     with_rod_joints,
 )
 from linkage_ros.names import free_name
-from linkage_ros.tools.models.mjcf_elements import DENSITY, DIFFERENCE, LEAST_INERTIA, write_limits
 from linkage_ros.tools.models.part import ModelPart, PrefixedNames
-from linkage_ros.tools.models.xml import format_number, format_numbers, format_rough
+from linkage_ros.tools.models.xml import (
+    DENSITY,
+    DIFFERENCE,
+    format_number,
+    format_numbers,
+    format_rough,
+    LEAST_INERTIA,
+    write_limits,
+)
 import numpy as np
 
 _LIGHT = 1e-3

@@ -12,20 +12,37 @@ XML for robot models: numbers that read back as the same floats, and comments of
 ``-p robot_description:="$(cat leg.urdf)"`` and a substitution in a launch file are read as YAML.
 Therefore a whole file is also a plain YAML scalar: no colon before a blank, and no hash after one
 (https://yaml.org/spec/1.1/, ns-plain-char).
+
+Below are elements of MJCF that planar and spatial linkages both have.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 import re
 from typing import Any
 from xml.etree import ElementTree as ET
+
+from linkage_ros.kinematics import Limits
 
 _STRUCTURE = re.compile(r':(?=\s)|(?<=\s)#')
 """Text that ends a plain scalar. In our files only names and comments can contain it."""
 
 _UNREADABLE = re.compile('[^\\n -~\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]')
 """Characters that XML or YAML does not allow; of all names only a file's can contain them."""
+
+DENSITY = 7850.0
+"""Density of links without a given mass: steel, in [kg/m³]."""
+
+DIFFERENCE = 1e-4
+"""Step of the finite differences, in [rad] or as a fraction of a length."""
+
+LEAST_INERTIA = 1e-12
+"""The engine needs an inertia; a body without extent gets this, in [kg·m²]."""
+
+_FARTHEST = 1e9
+"""Stands for the missing limit of a joint that has one limit only, in [rad] or [m]."""
 
 
 def format_number(value: float) -> str:
@@ -58,3 +75,13 @@ def xml_document(root: ET.Element) -> bytes:
     text = _UNREADABLE.sub('\ufffd', ET.tostring(root, 'unicode'))
     text = _STRUCTURE.sub(lambda found: f'&#{ord(found[0])};', text)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n'.encode()
+
+
+def write_limits(joint: ET.Element, limits: Limits) -> None:
+    """Write the limits of a joint that MJCF can express: it has none for rates."""
+    if limits.is_bounded:
+        joint.set(
+            'range', format_numbers(max(limits.low, -_FARTHEST), min(limits.high, _FARTHEST))
+        )
+    if limits.effort < inf:
+        joint.set('actuatorfrcrange', format_numbers(-limits.effort, limits.effort))
