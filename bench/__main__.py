@@ -25,6 +25,7 @@ from bench.empty_scene import measure_empty_scene
 from bench.inverse import measure_inverse
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
+from bench.processes import Graph, MeasurementError
 from bench.report import FOLDER, machine_table, PAGES, say, show, Table, write_page
 from bench.space import measure_space
 from bench.ticks import (
@@ -39,7 +40,7 @@ from bench.ticks import (
     with_parameters,
 )
 from bench.transmissions import measure_transmissions
-from linkage_ros.processes import Graph, MeasurementError, private_domain
+from linkage_ros.domains import private_domain
 
 SLOW, FAST = 1000.0, 10_000.0
 

@@ -23,10 +23,10 @@ from typing import Any
 
 from bench import ROOT
 from bench.compiled import ACCELERATION, in_c, RATE
+from bench.processes import MeasurementError
 from bench.report import in_turn, ratios, say, spread, Table
 from linkage_ros.description import load
 from linkage_ros.kinematics import Array, is_iterated
-from linkage_ros.processes import MeasurementError
 from linkage_ros.tools.models import make_array_functions
 import numpy as np
 

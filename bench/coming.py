@@ -23,9 +23,9 @@ from pathlib import Path
 import time
 from typing import Any
 
+from bench.processes import Graph, MeasurementError, Process
 from bench.report import say, Table
 from bench.ticks import cpu_time, write_turning
-from linkage_ros.processes import Graph, MeasurementError, Process
 from linkage_ros.resources import shipped_path
 
 _APPEARING = 15.0

@@ -25,11 +25,11 @@ import subprocess
 import time
 
 from bench import ROOT
+from bench.processes import MeasurementError
 from bench.report import in_turn, ratios, say, spread, Table
 from linkage_ros.description import load, parse_yaml, read_linkage
 from linkage_ros.kinematics import Array, Closure, is_iterated
 from linkage_ros.kinematics.compiling import Compiled
-from linkage_ros.processes import MeasurementError
 from linkage_ros.tools.models.source_code import C, Subject, write_source
 import numpy as np
 

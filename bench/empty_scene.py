@@ -20,10 +20,10 @@ from collections.abc import Callable
 from math import atan2, cos, isclose, sin, sqrt
 
 from bench import ROOT
+from bench.processes import MeasurementError
 from bench.report import compare, in_turn, Table
 from linkage_ros.description import parse_scene
 from linkage_ros.messages import JointStateReader, JointStateWriter, Rejection
-from linkage_ros.processes import MeasurementError
 from linkage_ros.tick import Pipeline
 
 BEGIN = 1_700_000_000_000_000_000

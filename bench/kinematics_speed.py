@@ -23,11 +23,11 @@ from importlib.util import find_spec
 from math import atan2, cos, sin, sqrt, tau
 
 from bench import ROOT
+from bench.processes import MeasurementError
 from bench.report import compare, in_turn, say, Table
 from linkage_ros.description import load
 from linkage_ros.kinematics import Batch, Closure
 from linkage_ros.kinematics.compiling import Compiled
-from linkage_ros.processes import MeasurementError
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
 
+from bench.processes import Graph
 from bench.report import ratios, say, spread, Table
 from bench.ticks import write_scene
-from linkage_ros.processes import Graph
 from linkage_ros.tools.study import percentile
 
 TARGET = 1.25

@@ -20,7 +20,6 @@ import time
 from bench import ROOT
 from linkage_ros import cli
 from linkage_ros.tools.study import alternate_order, describe_machine, spread_of
-from linkage_ros.tools.view.pages import table_lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +38,27 @@ class Table:
     def markdown(self) -> str:
         """Return the table as Markdown."""
         return '\n'.join([f'## {self.title}', '', *table_lines(self.aligned()), ''])
+
+
+def table_lines(table: cli.Table) -> list[str]:
+    """Return the lines of a table whose cells are Markdown; a title is left out."""
+    table = table.as_texts()
+    heads = [head.removeprefix('>') for head in table.heads]
+    rule = ['---:' if head.startswith('>') else '---' for head in table.heads]
+    return [f'| {" | ".join(line)} |' for line in (heads, rule, *table.rows)]
+
+
+def part_marks(name: str) -> tuple[str, str]:
+    """Return the two comments that enclose a generated part."""
+    return f'<!-- {name}: begin -->', f'<!-- {name}: end -->'
+
+
+def fill_marks(page: str, name: str, text: str) -> str:
+    """Return a page with a text between two of its marks; the rest stays as it is."""
+    begin, end = part_marks(name)
+    head, _, rest = page.partition(begin)
+    _, _, tail = rest.partition(end)
+    return f'{head}{begin}\n{text}\n{end}{tail}'
 
 
 def say(line: str) -> None:

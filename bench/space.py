@@ -13,11 +13,11 @@ from collections.abc import Callable
 from random import Random
 from typing import Any
 
+from bench.processes import MeasurementError
 from bench.report import compare, in_turn, Table
 from linkage_ros.description import load
 from linkage_ros.kinematics import Batch, Status
 from linkage_ros.kinematics.compiling import Compiled
-from linkage_ros.processes import MeasurementError
 import numpy as np
 
 RATE, ACCELERATION = 3.0, 0.5

@@ -18,8 +18,8 @@ from pathlib import Path
 import time
 
 from bench import ROOT
+from bench.processes import Graph, MeasurementError, Process
 from bench.report import ratios, say, spread, Table
-from linkage_ros.processes import Graph, MeasurementError, Process
 from linkage_ros.tools.study import alternate_order
 
 _FOUR_BAR = ROOT / 'config' / 'linkages' / 'four_bar.yaml'

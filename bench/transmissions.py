@@ -18,10 +18,10 @@ from pathlib import Path
 import subprocess
 
 from bench import ROOT
+from bench.processes import MeasurementError
 from bench.report import ratios, spread, Table
 from linkage_ros.cli.main import main
 from linkage_ros.description import load
-from linkage_ros.processes import MeasurementError
 
 _STAND_IN = ROOT / 'test' / 'tools' / 'models' / 'ros2_control_stand_in'
 _TRANSMISSIONS: dict[str, tuple[list[str], str]] = {

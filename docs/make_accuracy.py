@@ -21,6 +21,7 @@ from pathlib import Path
 import sys
 from typing import NamedTuple
 
+from bench.report import fill_marks, table_lines
 from linkage_ros.cli import Table
 from linkage_ros.description import LINKAGE_FILE, load_scene, parse_scene, Scene, SCENE_FILE
 from linkage_ros.errors import list_names
@@ -47,7 +48,6 @@ from linkage_ros.tools.study import (
     tick_price,
     turn_crank,
 )
-from linkage_ros.tools.view.pages import fill_marks, table_lines
 
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'accuracy.md'

@@ -23,13 +23,13 @@ import re
 import sys
 from typing import NamedTuple
 
+from bench.report import fill_marks, part_marks, table_lines
 from linkage_ros.cli import parameters_of, REGISTRIES, Table, table_of
 from linkage_ros.description import first_docstring_line, parameter_rows, parse_scene
 from linkage_ros.dynamics import AppliedLoads
 from linkage_ros.errors import FileError
 from linkage_ros.stages.effects import BASES, EFFECTS, MessageEffect, needed_effects
 from linkage_ros.tick import Pipeline
-from linkage_ros.tools.view.pages import markdown
 import yaml
 
 DOCS = Path(__file__).resolve().parent
@@ -135,12 +135,12 @@ def filled(page: str) -> str:
     for section in sections(page):
         text = section.text
         for mark, made in _MADE.items():
-            if markdown.part_marks(mark)[0] in text:
-                text = markdown.fill_marks(text, mark, made())
+            if part_marks(mark)[0] in text:
+                text = fill_marks(text, mark, made())
         if section.name in kinds:
             kind = kinds[section.name]
-            text = markdown.fill_marks(text, 'place', place(kind, section.name))
-            text = markdown.fill_marks(text, 'parameters', parameters(kind, section.name))
+            text = fill_marks(text, 'place', place(kind, section.name))
+            text = fill_marks(text, 'parameters', parameters(kind, section.name))
         parts.append(text)
     return ''.join(parts)
 
@@ -203,21 +203,21 @@ def parameters(kind: str, name: str) -> str:
     if len(table.heads) == 1:
         return 'It has no parameters.'
     rows = [(f'`{row[0]}`', *row[1:]) for row in table.rows]
-    return '\n'.join(markdown.table_lines(Table('', table.heads, rows)))
+    return '\n'.join(table_lines(Table('', table.heads, rows)))
 
 
 def loads() -> str:
     """Return the table of parameters of the loads on joints and points."""
     heads = 'parameter', 'unit', 'default', 'values', 'meaning'
     rows = [(f'`{key}`', *more) for key, *more in parameter_rows(AppliedLoads)]
-    return '\n'.join(markdown.table_lines(Table('', heads, rows)))
+    return '\n'.join(table_lines(Table('', heads, rows)))
 
 
 def refused() -> str:
     """Return the table of refused scenes with their errors."""
     scenes = yaml.safe_load(REFUSED.read_text('utf-8'))
     rows = [(each['what'], f'`{_error_of(**each)}`') for each in scenes]
-    return '\n'.join(markdown.table_lines(Table('', ('scene', 'error'), rows)))
+    return '\n'.join(table_lines(Table('', ('scene', 'error'), rows)))
 
 
 _MADE = {

@@ -24,6 +24,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+from bench.report import table_lines
 from linkage_ros.cli import (
     COMMANDS,
     EXIT_CODES,
@@ -34,7 +35,6 @@ from linkage_ros.cli import (
     table_of,
 )
 from linkage_ros.description import linkage_schema, scene_schema
-from linkage_ros.tools.view.pages import table_lines
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

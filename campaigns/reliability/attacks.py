@@ -22,11 +22,12 @@ from pathlib import Path
 import re
 from tempfile import TemporaryDirectory
 
+from bench.processes import Graph, MeasurementError
 from bench.report import Table
 from campaigns.campaign import Findings, Page, results_of
 from campaigns.reliability import hostile_bags, hostile_files, signals
 from campaigns.reliability.judge import Try
-from linkage_ros.processes import Graph, MeasurementError, private_domain
+from linkage_ros.domains import private_domain
 from linkage_ros.resources import shipped_path
 
 PAGE = Page(

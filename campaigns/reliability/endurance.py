@@ -23,6 +23,7 @@ from tempfile import TemporaryDirectory
 import time
 from typing import Any
 
+from bench.processes import MeasurementError
 from bench.report import say, Table
 from campaigns.campaign import Findings, Page, progress_lines
 from campaigns.reliability import accelerated
@@ -38,7 +39,6 @@ from campaigns.reliability.memory import (
 )
 from campaigns.reliability.processes import in_own_process, recording_node
 from linkage_ros.bag import read_bag
-from linkage_ros.processes import MeasurementError
 from rosbags.typesys import get_typestore, Stores
 
 PAGE = Page(

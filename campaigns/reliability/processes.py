@@ -27,9 +27,10 @@ import traceback
 from typing import Any, NamedTuple
 from unittest import mock
 
+from bench.processes import Graph, Process
 from linkage_ros.bag import METADATA_FILE
 from linkage_ros.cli import main as command_line
-from linkage_ros.processes import Graph, private_domain, Process
+from linkage_ros.domains import private_domain
 from linkage_ros.signals import Stop
 
 MEMORY = 2**32

@@ -30,6 +30,7 @@ from tempfile import TemporaryDirectory
 from time import monotonic, sleep, time_ns
 from typing import Any, NamedTuple
 
+from bench.processes import MeasurementError
 from bench.report import say, Table
 from campaigns.campaign import percentile_texts
 from campaigns.reliability.filling import Disk, mounted
@@ -37,7 +38,6 @@ from campaigns.reliability.judge import Counts, counts_of, shortcomings
 from campaigns.reliability.processes import recording_node
 from linkage_ros.bag import read_bag
 from linkage_ros.errors import BagError
-from linkage_ros.processes import MeasurementError
 
 _FREEZE, _THAW = 0xC0045877, 0xC0045878
 _DISK = Disk('ext4, 256 MiB', 'ext4', 256)

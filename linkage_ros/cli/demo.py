@@ -31,9 +31,9 @@ from linkage_ros.cli.run import add_run_arguments, run_scene
 from linkage_ros.cli.table import Table
 from linkage_ros.cli.terminal import print_tables
 from linkage_ros.description import load_scene, Scene, SceneLinkage
+from linkage_ros.domains import private_domain
 from linkage_ros.errors import did_you_mean, LinkageError, list_names
 from linkage_ros.node import stay_on_this_machine
-from linkage_ros.processes import private_domain
 from linkage_ros.resources import scene_names, shipped_path
 from linkage_ros.signals import heed_signals
 from linkage_ros.workbench import find_tool

@@ -18,7 +18,7 @@ import shutil
 import subprocess
 import sys
 
-from linkage_ros.processes import private_domain
+from linkage_ros.domains import private_domain
 import pytest
 
 from .blocks import Block, blocks, COMMANDS, commands, missing, PAGES, ROOT

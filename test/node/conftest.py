@@ -19,7 +19,7 @@ LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 if find_spec('rclpy') is None:
     collect_ignore_glob = ['test_*.py']
 else:
-    from linkage_ros.processes import held_domain
+    from linkage_ros.domains import held_domain
 
     from .graph import Graph, NodeProcess
 

@@ -19,8 +19,8 @@ from pathlib import Path
 import re
 from xml.etree import ElementTree as ET
 
+from linkage_ros.domains import held_domain
 from linkage_ros.node import LinkageNode
-from linkage_ros.processes import held_domain
 import pytest
 import rclpy
 from rclpy.lifecycle import TransitionCallbackReturn

@@ -38,7 +38,7 @@ from typing import NoReturn
 
 import linkage_ros
 from linkage_ros.cli.main import main
-from linkage_ros.processes import private_domain
+from linkage_ros.domains import private_domain
 
 # What commands import only where they need it.
 LIBRARIES = (

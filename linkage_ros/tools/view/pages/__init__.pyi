@@ -13,7 +13,3 @@ from linkage_ros.tools.view.pages.document import (
     SERVED_POLICY as SERVED_POLICY,
     table_html as table_html,
 )
-from linkage_ros.tools.view.pages.markdown import (
-    fill_marks as fill_marks,
-    table_lines as table_lines,
-)

@@ -14,7 +14,6 @@ Its content policy forbids the browser all requests, whatever the page holds.
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from importlib import resources
@@ -94,11 +93,6 @@ def html_document(
             '',
         ]
     )
-
-
-def svg_data_url(svg: bytes) -> str:
-    """Return an SVG as a data URL."""
-    return f'data:image/svg+xml;base64,{b64encode(svg).decode()}'
 
 
 def plotting_library() -> str:

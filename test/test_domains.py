@@ -12,14 +12,13 @@ from contextlib import ExitStack
 import subprocess
 import sys
 
-from linkage_ros import processes
+from linkage_ros import domains
+from linkage_ros.domains import held_domain, private_domain
 from linkage_ros.errors import LinkageError
-from linkage_ros.processes import held_domain, private_domain
 import pytest
 
 HOLD = (
-    'from linkage_ros.processes import private_domain; '
-    'print(private_domain(), flush=True); input()'
+    'from linkage_ros.domains import private_domain; print(private_domain(), flush=True); input()'
 )
 
 
@@ -33,7 +32,7 @@ def holder():
 
 def held(domain):
     """Return whether this process could hold a domain."""
-    with processes._lock_domain(domain) as locked:
+    with domains._lock_domain(domain) as locked:
         return locked
 
 
@@ -58,7 +57,7 @@ def test_killed_process_releases_its_ros_domain():
 
 def test_symbolic_link_named_as_a_lock_is_not_followed(tmp_path, monkeypatch):
     """Any user may make one in the folder of temporary files."""
-    monkeypatch.setattr(processes, 'gettempdir', lambda: str(tmp_path))
+    monkeypatch.setattr(domains, 'gettempdir', lambda: str(tmp_path))
     precious = tmp_path / 'precious'
     precious.write_text('content')
     (tmp_path / 'linkage_ros_domain_7').symlink_to(precious)
@@ -70,7 +69,7 @@ def test_symbolic_link_named_as_a_lock_is_not_followed(tmp_path, monkeypatch):
 
 def test_exhausted_ros_domains_are_reported_in_one_line(monkeypatch):
     # Domains that no graph uses: the real ones are needed by tests beside this one.
-    monkeypatch.setattr(processes, '_DOMAINS', range(1001, 1003))
+    monkeypatch.setattr(domains, '_DOMAINS', range(1001, 1003))
     with (
         held_domain() as one,
         held_domain() as other,

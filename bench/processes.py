@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Processes on a private ROS graph: start them, ask them, end them by their pid.
+Processes on a ROS graph of their own: start them, ask them, end them by their pid.
 
 Each process has a limited life: an alarm survives ``exec`` and the end of any parent, so that no
 process keeps running.
@@ -15,11 +15,8 @@ process keeps running.
 
 from __future__ import annotations
 
-import atexit
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, ExitStack
-import fcntl
-from functools import cache
+from contextlib import contextmanager
 import json
 import os
 from pathlib import Path
@@ -27,11 +24,10 @@ import select
 import signal
 import subprocess
 import sys
-from tempfile import gettempdir
 import time
 from typing import Any
 
-from linkage_ros.errors import LinkageError
+from bench import ROOT
 
 _PATIENCE = 15.0
 """Time limit for an answer of a process, in [s]."""
@@ -47,50 +43,6 @@ _BOUNDED = (
     'os.execv(sys.executable, [sys.executable, *sys.argv[2:]])'
 )
 """Runs Python with the arguments after the first, for at most that many seconds."""
-
-_DOMAINS = range(1, 102)
-"""ROS domains whose ports are safe on every operating system."""
-
-
-@contextmanager
-def held_domain() -> Iterator[int]:
-    """Hold a ROS domain that no other process here holds; a LinkageError if all are held."""
-    # Not from the first domain, which other programs take.
-    first = os.getpid() % len(_DOMAINS)
-    for domain in (*_DOMAINS[first:], *_DOMAINS[:first]):
-        with _lock_domain(domain) as held:
-            if held:
-                yield domain
-                return
-    raise LinkageError(
-        'ROS_DOMAIN_ID', f'{len(_DOMAINS)} graphs run on this machine', 'end some of them'
-    )
-
-
-@contextmanager
-def _lock_domain(domain: int) -> Iterator[bool]:
-    """Lock the file of a domain; return whether it could be locked."""
-    with ExitStack() as opened:
-        try:
-            # The folder is open to all users: the name may be a link, or a file with content.
-            file = os.open(
-                Path(gettempdir(), f'linkage_ros_domain_{domain}'),
-                os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK,
-            )
-            opened.callback(os.close, file)
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:  # held by another process, or another user's
-            yield False
-        else:
-            yield True
-
-
-@cache
-def private_domain() -> int:
-    """Return the ROS domain that this process holds until its end, see `held_domain`."""
-    held = ExitStack()
-    atexit.register(held.close)
-    return held.enter_context(held_domain())
 
 
 class MeasurementError(Exception):
@@ -198,8 +150,7 @@ class Graph:
         with log.open('wb') as errors:
             popen = subprocess.Popen(
                 [sys.executable, *command],
-                # The folder of the checkout's modules.
-                cwd=Path(__file__).parents[1],
+                cwd=ROOT,
                 env={**self._environment, **(more or {})},
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
