@@ -19,7 +19,7 @@
 
 from linkage_ros.bag.reader import Bag as Bag, BagMessage as BagMessage, read_bag as read_bag
 from linkage_ros.tools.models.array_functions import ArrayFunctions as ArrayFunctions
-from linkage_ros.tools.drawing.svg_picture import svg as svg
+from linkage_ros.tools.drawing.drawn_linkage import svg as svg
 from linkage_ros.errors import (
     BagError as BagError,
     DefinitionError as DefinitionError,
@@ -74,6 +74,6 @@ from linkage_ros.tools.design.motion import (
 )
 from linkage_ros.tools.design.path.curves import PathTask as PathTask
 from linkage_ros.tools.design.path.generate import generate_path as generate_path
-from linkage_ros.tools.view.linkage_page import LinkagePage as LinkagePage
+from linkage_ros.tools.view.page import LinkagePage as LinkagePage
 
 __version__: str

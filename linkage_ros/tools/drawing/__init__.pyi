@@ -25,7 +25,7 @@ from linkage_ros.tools.drawing.drawing_data import (
     drawn_in_frames as drawn_in_frames,
     pose_in_frames as pose_in_frames,
 )
-from linkage_ros.tools.drawing.drawn_linkage import draw_linkage as draw_linkage
+from linkage_ros.tools.drawing.drawn_linkage import draw_linkage as draw_linkage, svg as svg
 from linkage_ros.tools.drawing.dxf import links_dxf as links_dxf
 from linkage_ros.tools.drawing.figure import (
     assemblies_picture as assemblies_picture,
@@ -65,4 +65,3 @@ from linkage_ros.tools.drawing.space_drawing import (
     space_page_data as space_page_data,
 )
 from linkage_ros.tools.drawing.spread import draw_spread as draw_spread, JointSpread as JointSpread
-from linkage_ros.tools.drawing.svg_picture import svg as svg

@@ -15,12 +15,7 @@ from linkage_ros.tools.view.edit import (
     EditResult as EditResult,
     pin_of as pin_of,
 )
-from linkage_ros.tools.view.exports import (
-    EXPORT_KINDS as EXPORT_KINDS,
-    export_linkage as export_linkage,
-)
 from linkage_ros.tools.view.hand_crank import HandCrank as HandCrank, HELD as HELD
-from linkage_ros.tools.view.linkage_page import LinkagePage as LinkagePage
 from linkage_ros.tools.view.live import add_live as add_live, live_page as live_page
 from linkage_ros.tools.view.live_bridge import LiveBridge as LiveBridge
 from linkage_ros.tools.view.model import (
@@ -28,9 +23,11 @@ from linkage_ros.tools.view.model import (
     model_of as model_of,
     ViewState as ViewState,
 )
-from linkage_ros.tools.view.page import page_html as page_html
+from linkage_ros.tools.view.page import LinkagePage as LinkagePage, page_html as page_html
 from linkage_ros.tools.view.report_command import bag_page as bag_page
 from linkage_ros.tools.view.requests import (
+    EXPORT_KINDS as EXPORT_KINDS,
+    export_linkage as export_linkage,
     LARGEST as LARGEST,
     read_request as read_request,
     RequestError as RequestError,

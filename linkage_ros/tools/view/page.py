@@ -6,7 +6,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The page of `linkage view`: the linkage under the hand, its curves, its numbers."""
+"""
+The page of `linkage view`: the linkage under the hand, its curves, its numbers.
+
+`LinkagePage` shows it in a cell of a notebook.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +19,8 @@ from html import escape
 from typing import Any
 
 from linkage_ros.errors import escape_unprintable
+from linkage_ros.kinematics import Closure
+from linkage_ros.tools.view.model import model_of
 from linkage_ros.tools.view.pages import html_document
 
 _PACKAGE = 'linkage_ros.tools.view'
@@ -47,6 +53,10 @@ _CURVES = {
     'rates': 'Rates',
     'accelerations': 'Accelerations, at a constant input rate',
 }
+
+
+_HEIGHT = 900
+"""Of the cell, in pixels; what is below is scrolled to."""
 
 
 def page_html(
@@ -177,3 +187,33 @@ def _plots() -> Iterator[str]:
             yield '<div><canvas id="band" role="img" aria-label="transmission angle over the '
             yield 'input"></canvas></div></figure>'
     yield '</div>'
+
+
+class LinkagePage:
+    """
+    The page of `linkage view` without a server: it moves, and is not edited.
+
+    A notebook shows it in a cell, as an object at its end.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+
+    Raises
+    ------
+    LinkageError
+        If plotly is not installed.
+
+    """
+
+    def __init__(self, closure: Closure) -> None:
+        self.text = page_html(model_of(closure, closure.name or 'linkage'), mode='still')
+        """The page, as a browser opens it from a file."""
+
+    def _repr_html_(self) -> str:
+        # What the cell shows reaches nothing of the notebook.
+        return (
+            f'<iframe srcdoc="{escape(self.text)}" title="the linkage" sandbox="allow-scripts" '
+            f'style="width: 100%; height: {_HEIGHT}px; border: 0"></iframe>'
+        )

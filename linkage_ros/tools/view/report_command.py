@@ -17,16 +17,19 @@ finished is shown as far as it goes; a bag without a scene, by its joint states 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
+from math import isfinite
 import os
 from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag import Bag, layout_of
+from linkage_ros.bag import Bag, Layout, layout_of
 from linkage_ros.cli import (
     add_bag,
     add_output,
+    add_trust,
     bag_json,
     bag_tables,
     describe_gaps,
@@ -34,13 +37,16 @@ from linkage_ros.cli import (
     output_or,
     path_beside,
     scene_json,
+    scene_of,
+    show_progress,
     Table,
 )
 from linkage_ros.description import atomic_write, Scene
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.signals import StoppedError
-from linkage_ros.tools.view.part_of_run import add_window, read_part, window_of
 from linkage_ros.tools.view.report import (
+    Progress,
+    read_run,
     ReportedRun,
     ReportHeader,
     run_html,
@@ -49,6 +55,8 @@ from linkage_ros.tools.view.report import (
 )
 
 EXAMPLE = 'linkage report my_bag -o my_bag.html'
+
+_MIB = 2**20
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -168,3 +176,59 @@ def check_page(file: Path) -> None:
         raise LinkageError(file, 'is a folder', 'name another file with -o')
     if not os.path.isdir(file.absolute().parent):  # noqa: PTH112
         raise LinkageError(file, 'lies in no folder that there is', 'name another file with -o')
+
+
+def add_window(parser: argparse.ArgumentParser) -> None:
+    """Declare the options for a part of a run, and the one for the effects of its scene."""
+    for name, end in (('since', 'beginning'), ('until', 'end')):
+        parser.add_argument(
+            f'--{name}',
+            type=float,
+            metavar='SECONDS',
+            help=f'{end} of a part, in seconds of the run',
+        )
+    add_trust(parser)
+
+
+def window_of(since: float | None, until: float | None) -> Window:
+    """
+    Return the part of a run between two times, in [s].
+
+    A LinkageError is raised if they are not times, or in the wrong order.
+    """
+    ends = []
+    for option, value, default in (('--since', since, 0), ('--until', until, Window().until)):
+        if value is not None and (not isfinite(value) or not 0.0 <= value < 1e9):
+            raise LinkageError(
+                option, f'{value} is not a time in a run', 'write seconds from 0 on'
+            )
+        ends.append(default if value is None else round(value * 1e9))
+    if ends[0] >= ends[1]:
+        raise LinkageError('--until', f'{until} is not after --since', 'write a later one')
+    return Window(*ends)
+
+
+def read_part(
+    bag: Bag,
+    layouts: Sequence[Layout],
+    window: Window,
+    stop: Event,
+    *,
+    trust_effects: bool = False,
+) -> tuple[ReportedRun, Scene | None, str]:
+    """
+    Read a part of a run; see `read_run`. The layouts of its files say how much there is to read.
+
+    A LinkageError is raised if the bag cannot be read, a StoppedError if the event was set.
+    """
+    size = max(1, sum(layout.content for layout in layouts) // _MIB)
+    with show_progress('read [MiB]') as advance:
+        found = read_run(
+            bag,
+            window,
+            Progress(lambda read: advance(read // _MIB, max(size, read // _MIB)), stop.is_set),
+            partial(scene_of, trust_effects=trust_effects),
+        )
+    if stop.is_set():
+        raise StoppedError
+    return found

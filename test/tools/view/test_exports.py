@@ -22,9 +22,9 @@ from linkage_ros.resources import shipped_path
 from linkage_ros.tools.view import (
     EXPORT_KINDS,
     export_linkage,
-    exports,
     read_request,
     RequestHandler,
+    requests,
 )
 from PIL import Image
 import pytest
@@ -62,7 +62,7 @@ def test_svg_export_is_xml_and_shows_the_pose(name: str) -> None:
 
 
 def test_gif_export_has_several_frames(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exports, '_SECONDS', 0.5)
+    monkeypatch.setattr(requests, '_SECONDS', 0.5)
     picture = Image.open(BytesIO(exported('gif', 'four_bar')))
     assert picture.format == 'GIF'
     assert picture.n_frames == 10
