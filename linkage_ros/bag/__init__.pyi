@@ -21,7 +21,6 @@ from linkage_ros.bag.contents import (
 )
 from linkage_ros.bag.disk import Reserve as Reserve
 from linkage_ros.bag.mcap_records import Message as Message, RecordSource as RecordSource
-from linkage_ros.bag.message_sink import MessageSink as MessageSink
 from linkage_ros.bag.metadata import (
     BagSummary as BagSummary,
     counts_in as counts_in,
@@ -103,6 +102,7 @@ from linkage_ros.bag.storage import COMPRESSIONS as COMPRESSIONS, Storage as Sto
 from linkage_ros.bag.topic import (
     CHANNELS_FILE as CHANNELS_FILE,
     INFINITE as INFINITE,
+    MessageSink as MessageSink,
     QosProfile as QosProfile,
     Topic as Topic,
 )

@@ -6,13 +6,17 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Description of a topic in a bag: type, definition and hash of the type, offered QoS."""
+"""
+Description of a topic in a bag: type, definition and hash of the type, offered QoS.
+
+`MessageSink` is what the messages of all topics of a run go to.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 CHANNELS_FILE = 'channels.mcap'
 """Name of an attachment of each of our files: an MCAP file with its topics and no messages."""
@@ -115,3 +119,11 @@ def _to_time(nanoseconds: int) -> dict[str, int]:
 
 def _from_time(time: Mapping[str, int]) -> int:
     return int(time['sec']) * 10**9 + int(time['nsec'])
+
+
+class MessageSink(Protocol):
+    """Takes the messages of a run: a recorder, or a memory of its last seconds."""
+
+    @property
+    def offer(self) -> Callable[[int, int, int, bytes], None]:
+        """Return what takes a message: topic, log time and publish time in [ns], CDR bytes."""

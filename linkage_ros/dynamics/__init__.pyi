@@ -16,6 +16,7 @@ from linkage_ros.dynamics.equation import (
     Terms as Terms,
 )
 from linkage_ros.dynamics.integrators import (
+    EXACT as EXACT,
     gauss_legendre as gauss_legendre,
     GAUSS_MATRIX as GAUSS_MATRIX,
     GAUSS_NODES as GAUSS_NODES,
@@ -43,7 +44,6 @@ from linkage_ros.dynamics.loads import (
     STIFFEST as STIFFEST,
     WrenchLoad as WrenchLoad,
 )
-from linkage_ros.dynamics.longest_step import EXACT as EXACT
 from linkage_ros.dynamics.motion import (
     LARGEST as LARGEST,
     last_before as last_before,

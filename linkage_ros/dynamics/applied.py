@@ -23,8 +23,8 @@ from itertools import chain, pairwise
 from math import hypot, sqrt, tau
 from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
-from linkage_ros.dynamics import longest_step
 from linkage_ros.dynamics.bodies import PLANE, Vectors
+from linkage_ros.dynamics.integrators import check_step, EXACT
 from linkage_ros.dynamics.joint_forms import LinkTurn
 from linkage_ros.dynamics.laws import Contact, Law, LawTerm, TorqueTable
 from linkage_ros.dynamics.loads import (
@@ -161,7 +161,7 @@ class PlanarParts:
 def _parts_of(closure: Any, applied: AppliedLoads) -> LoadedParts:
     if isinstance(closure, PlanarClosure):
         return PlanarParts(closure)
-    from linkage_ros.dynamics.spatial_parts import SpatialParts  # local import: in space only
+    from linkage_ros.dynamics.spatial_bodies import SpatialParts  # local import: in space only
 
     return SpatialParts(closure, applied)
 
@@ -290,14 +290,14 @@ class AppliedForces:
             if fastest > worst:
                 worst = fastest
                 blamed = max(touched, key=lambda key: yielding[key].stiffness * touched[key] ** 2)
-        longest_step.check_step(
+        check_step(
             f'loads.{blamed}',
             worst,
             method,
             step,
             'it is too stiff',
             'write a smaller stiffness or damping',
-            longest_step.EXACT,
+            EXACT,
         )
 
     def check_step_at(
@@ -334,14 +334,14 @@ class AppliedForces:
         fastest = [
             float(np.linalg.eigvals(moved_by @ of).real.max()) for of in (stiffness, damping)
         ]
-        longest_step.check_step(
+        check_step(
             f'loads.{blamed}',
             _fastest_eigenvalue(*fastest),
             method,
             step,
             'it is too stiff',
             'write a smaller stiffness or damping',
-            longest_step.EXACT,
+            EXACT,
         )
 
     @property

@@ -41,6 +41,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.bodies import BodyModel, planar_bodies, spring_length
 from linkage_ros.dynamics.dry_friction import DryFriction, JointStop, settle_forces, Slip
+from linkage_ros.dynamics.integrators import check_step, EXACT
 from linkage_ros.dynamics.loads import (
     check_loads,
     check_masses,
@@ -48,7 +49,6 @@ from linkage_ros.dynamics.loads import (
     JointFriction,
     Loads,
 )
-from linkage_ros.dynamics.longest_step import check_step, EXACT
 from linkage_ros.kinematics import (
     Acceleration,
     all_finite,

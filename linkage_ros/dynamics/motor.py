@@ -37,8 +37,8 @@ from math import copysign, inf
 from typing import Any, TYPE_CHECKING, TypeVar
 
 from linkage_ros.dynamics.equation import Terms
+from linkage_ros.dynamics.integrators import check_step
 from linkage_ros.dynamics.laws import LawTerm
-from linkage_ros.dynamics.longest_step import check_step
 from linkage_ros.dynamics.motion import LARGEST, SingleDofMechanism
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-The bodies of a linkage in space, as its equation of motion sees them.
+The bodies of a linkage in space, as its equation of motion sees them, and what loads act on.
 
 The turn s of a link is its spin in its own axes, and K its tensor of inertia there. The moment
 that turns it is K·ṡ + s × K·s (Euler).
@@ -16,20 +16,29 @@ A rod that may spin about itself turns by s = v2 − v1, the velocities of its e
 of inertia I across it and its length L, K is the number I/L²: |s|/L is its rate of turning. This
 is exact for a centre of mass on its axis and a tensor that is round about it; its spin then stays
 as it is, and works on nothing.
+
+Loads act on points of links along directions, and on links about axes. A rod that may spin has no
+axes of its own, and a torque along it would spin it: a load that turns with it, and a torque on
+it, are refused.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 from linkage_ros.dynamics.bodies import BodyModel, RigidBody, Vectors
-from linkage_ros.dynamics.loads import Loads
+from linkage_ros.dynamics.joint_forms import LinkTurn
+from linkage_ros.dynamics.loads import AppliedLoads, Loads
 from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics import (
     check_inertia,
     cross,
     dot,
+    GROUND_FRAME,
     length,
     minus,
     plus,
+    Position,
     scale,
     SpaceClosure,
     SpatialMass,
@@ -142,3 +151,49 @@ def _rod_gyration(closure: SpaceClosure, link: str, body: SpatialMass) -> float:
             f'leave it out, as {{mass: {body.mass:g}}} of a thin rod, or {remedy}',
         )
     return across / (size * size)
+
+
+class SpatialParts:
+    """What loads act on in space."""
+
+    vectors = SPACE
+    wrench_numbers: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+
+    def __init__(self, closure: SpaceClosure, applied: AppliedLoads) -> None:
+        self._closure = closure
+        for name, force in applied.forces.items():
+            if name.rpartition('.')[0] in closure.idle and force.frame == 'link':
+                raise DefinitionError(
+                    f'loads.forces.{name}.frame',
+                    'the rod may spin about itself, and has no axes that turn with it',
+                    'write frame: ground',
+                )
+        for link in applied.wrenches:
+            if link in closure.idle:
+                raise DefinitionError(
+                    f'loads.wrenches.{link}',
+                    'the rod may spin about itself, and nothing bears a torque along it',
+                    'name the link that holds it',
+                )
+
+    def place(self, link: str, point: str) -> Vector:
+        if point:
+            return self._closure.linkage.points[point]
+        pose = self._closure.close_unlimited(*self._closure.linkage.pose.inputs)
+        return self._closure.frames(pose)[link][0]
+
+    def direction(self, link: str, vector: Vector, frame: str) -> Callable[[Position], Vector]:
+        if frame == 'ground':
+            return lambda _: vector
+        return self._closure.carried_vector(link, vector)
+
+    def axes(self, link: str, frame: str) -> list[Callable[[Position], Vector]]:
+        return [self.direction(link, axis, frame) for axis in GROUND_FRAME[:3]]
+
+    def turns(self, link: str, frame: str) -> Sequence[LinkTurn]:
+        spin = self._closure.spin_of(link)
+
+        def turn(axis: Callable[[Position], Vector]) -> LinkTurn:
+            return LinkTurn(link, lambda v, position: dot(spin(v), axis(position)), axis)
+
+        return [turn(axis) for axis in self.axes(link, frame)]

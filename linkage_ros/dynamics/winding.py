@@ -29,7 +29,7 @@ from dataclasses import dataclass, replace
 from math import expm1, inf, sqrt
 from typing import Any, ClassVar, NamedTuple
 
-from linkage_ros.dynamics.longest_step import check_step
+from linkage_ros.dynamics.integrators import check_step
 from linkage_ros.dynamics.motor import Motor
 from linkage_ros.errors import DefinitionError
 

@@ -129,7 +129,10 @@ from linkage_ros.kinematics.plane.checks import (
     check_planar as check_planar,
     PLANAR_ONLY as PLANAR_ONLY,
 )
-from linkage_ros.kinematics.plane.closure import PlanarClosure as PlanarClosure
+from linkage_ros.kinematics.plane.closure import (
+    PlanarClosure as PlanarClosure,
+    separate_blocks as separate_blocks,
+)
 from linkage_ros.kinematics.plane.drawn_pose import read_drawn_pose as read_drawn_pose
 from linkage_ros.kinematics.plane.dyads.rpr import (
     RPRDyad as RPRDyad,
@@ -141,7 +144,6 @@ from linkage_ros.kinematics.plane.dyads.rrr import (
     RRRDyad as RRRDyad,
     RRRPose as RRRPose,
 )
-from linkage_ros.kinematics.plane.link_frames import separate_blocks as separate_blocks
 from linkage_ros.kinematics.plane.linkage import (
     AssemblyPose as AssemblyPose,
     GROUND as GROUND,

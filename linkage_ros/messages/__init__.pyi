@@ -10,7 +10,10 @@
 # parse_declaration, pack_message, parse_message, MessageContent, JointTrajectoryWriter,
 # JointWrenchWriter, MarkerArrayWriter.
 
-from linkage_ros.messages.input_samples import input_reader as input_reader
+from linkage_ros.messages.input_samples import (
+    input_reader as input_reader,
+    SampleRouter as SampleRouter,
+)
 from linkage_ros.messages.joint_state import (
     arrays_of as arrays_of,
     CrankSample as CrankSample,
@@ -72,7 +75,6 @@ from linkage_ros.messages.marker_array import (
     TEXT_VIEW_FACING as TEXT_VIEW_FACING,
     TRIANGLE_LIST as TRIANGLE_LIST,
 )
-from linkage_ros.messages.sample_router import SampleRouter as SampleRouter
 from linkage_ros.messages.single_values import (
     text_message as text_message,
     text_of as text_of,

@@ -9,31 +9,37 @@
 """
 Compute the state of one linkage at a tick: crank, closure, mechanism, sensors.
 
-Only the stages that the scene names are built; a tick never reads the scene.
+Only the stages that the scene names are built; a tick never reads the scene. Combinations of
+effects that act on nothing are refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import add
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING, TypeVar
 
 from linkage_ros.description import Scene, SceneLinkage
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics import Closure, Position, Status
 from linkage_ros.messages import Rejection
 from linkage_ros.stages.drives import Context, Crank, CrankState, Drive
 from linkage_ros.stages.effects import (
     Continuous,
     DriveEffect,
+    Effect,
+    effect_class,
     first_values,
+    force_effects,
     ForceEffect,
+    in_order,
     LinkageEffect,
     MechanismEffect,
     MechanismState,
     MessageEffect,
+    needed_effects,
     SensorEffect,
     SensorReading,
     SensorStage,
@@ -41,11 +47,12 @@ from linkage_ros.stages.effects import (
     WriterStage,
 )
 from linkage_ros.tick.linkage_state import LinkageState
-from linkage_ros.tick.wanted_effects import choose_effects, WantedEffects
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics import AppliedForces, HeldWrench
     from linkage_ros.stages.faults import Injection
+
+_Base = TypeVar('_Base', bound=Effect)
 
 
 class AuxiliaryOutput(NamedTuple):
@@ -407,3 +414,69 @@ def _make_closure(scene_linkage: SceneLinkage, wanted: WantedEffects, seed: str)
     for name, effect in wanted.of_kind(LinkageEffect).items():
         linkage = effect.alter(linkage, Context.generator(seed, name))
     return scene_linkage.closure if linkage is scene_linkage.closure.linkage else Closure(linkage)
+
+
+@dataclass(frozen=True)
+class WantedEffects:
+    """The effects that a linkage computes, with their parameters."""
+
+    named: frozenset[str]  # Those that the scene names, and those published with them
+    effects: Mapping[str, Effect]  # All that are computed, by name, in physical order
+    computes_forces: bool  # Whether an effect or the drive asks for forces
+    moves_by_rates: bool  # Whether the drive moves the crank on by its rates between samples
+
+    def of_kind(self, base: type[_Base]) -> dict[str, _Base]:
+        """Return the effects that act in the place of a base, by name, in physical order."""
+        return {name: effect for name, effect in self.effects.items() if isinstance(effect, base)}
+
+
+def choose_effects(scene_linkage: SceneLinkage) -> WantedEffects:
+    """Return the effects of a linkage, and those that they start from."""
+    _refuse_not_imported(scene_linkage)
+    _, drive = scene_linkage.drive
+    effects = dict(scene_linkage.effects)
+    for effect in scene_linkage.effects.values():
+        for also in effect.publishes_with:
+            effects.setdefault(also, effect_class(also)())
+    named = frozenset(effects)
+    moves_by_rates = drive.moves_by_rates
+    needs = {
+        need
+        for effect in effects.values()
+        for need in effect.needs_here(named, moves_by_rates=moves_by_rates)
+    }
+    for name in needs.union(*map(needed_effects, needs)):
+        effects.setdefault(name, effect_class(name)())
+    computes_forces = drive.gives_torque or any(e.computes_forces for e in effects.values())
+    _refuse_idle(scene_linkage, computes_forces)
+    ordered = {name: effects[name] for name in in_order(effects)}
+    return WantedEffects(named, ordered, computes_forces, moves_by_rates)
+
+
+def _refuse_not_imported(scene_linkage: SceneLinkage) -> None:
+    if scene_linkage.not_imported:
+        from linkage_ros.stages.effects import found_in
+
+        name = scene_linkage.not_imported[0]
+        raise DefinitionError(
+            f'effects.{name}',
+            f'names a module, and what a bag names is not imported unasked; the name leads to '
+            f'{found_in(name)} here',
+            '--trust-effects imports it',
+        )
+
+
+def _refuse_idle(scene_linkage: SceneLinkage, forced: bool) -> None:
+    """Refuse an effect that has nothing to act on."""
+    # With several linkages, one without forces may share an effect that another one needs.
+    section = scene_linkage.content
+    idle = ['loads'] if scene_linkage.loads and 'loads' in section else []
+    if 'effects' in section:
+        effects = scene_linkage.effects.items()
+        idle += [f'effects.{name}' for name, each in effects if isinstance(each, ForceEffect)]
+    if idle and not forced:
+        raise DefinitionError(
+            idle[0],
+            'acts on nothing here: no effect and no drive asks for forces',
+            f'leave it out, drive by torque, or name one of {list_names(force_effects())}',
+        )

@@ -10,7 +10,7 @@
 
 from linkage_ros.description import load_scene, parse_scene
 from linkage_ros.errors import FileError
-from linkage_ros.messages import JointStateWriter, Rejection, sample_router
+from linkage_ros.messages import input_samples, JointStateWriter, Rejection
 from linkage_ros.tick import Pipeline
 import pytest
 
@@ -92,11 +92,11 @@ linkages:
 
 def test_message_is_parsed_only_for_new_joint_names(monkeypatch):
     parsed = []
-    head_of = sample_router.head_of
+    head_of = input_samples.head_of
     monkeypatch.setattr(
-        sample_router, 'head_of', lambda message: parsed.append(message) or head_of(message)
+        input_samples, 'head_of', lambda message: parsed.append(message) or head_of(message)
     )
-    routes = sample_router.SampleRouter({'left': ['a'], 'right': ['b']})
+    routes = input_samples.SampleRouter({'left': ['a'], 'right': ['b']})
     wanted = {('a', 'b'): ('left', 'right'), ('b', 'c'): ('right',), ('b', 'a'): ('left', 'right')}
     writers = {names: JointStateWriter(names) for names in wanted}
     for stamp in range(1, 5):  # other stamps and values, the same names

@@ -6,13 +6,13 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The loop closure of a planar linkage: from its inputs to its joints and its points."""
+"""The loop closure of a planar linkage: from its inputs to its joints, points and frames."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import tau
-from typing import TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.analysis.ranges import closing_ranges, link_lengths
 from linkage_ros.kinematics.arithmetic import unit_vector
@@ -37,7 +37,7 @@ from linkage_ros.kinematics.step import LinkState
 if TYPE_CHECKING:
     from linkage_ros import LinkagePage
     from linkage_ros.kinematics.analysis.point_tracker import PointTracker
-    from linkage_ros.kinematics.plane.link_frames import LinkFrames
+    from linkage_ros.kinematics.results import Position, Velocity
 
 
 class PlanarClosure(Closure):
@@ -162,11 +162,7 @@ class PlanarClosure(Closure):
     @BuiltProperty
     def link_frames(self) -> LinkFrames:
         """Return the frames of the links and blocks that move."""
-        from linkage_ros.kinematics.plane.link_frames import (
-            LinkFrames,  # local import: only drawings need it
-        )
-
-        return LinkFrames(self.linkage, self.structure, self._known)
+        return LinkFrames(self)
 
     def link_angles(self, position: Position) -> dict[str, float]:
         """Return the angle of every link to the ground, in [rad], not wrapped."""
@@ -276,3 +272,64 @@ class PlanarClosure(Closure):
         if isinstance(joint, SlideJoint):
             return i, j, factor * self.scale, constant * self.scale
         return i, j, factor, constant + tau * joint.turns
+
+
+class Block(NamedTuple):
+    """The block of a slider: the link along which it slides, and a point of the link with it."""
+
+    name: str
+    along: str
+    point: str
+    link: str
+
+
+class LinkFrames:
+    """
+    The frames of the links that move, and of the blocks of sliders that are not links.
+
+    Such a block has its frame at the slider's point, with the angle of the link it slides along.
+    """
+
+    def __init__(self, closure: PlanarClosure) -> None:
+        linkage = closure.linkage
+        carriers = {link: (link, 0j, link) for link in linkage.links if link != GROUND} | {
+            block.name: (
+                block.link,
+                complex(*linkage.links[block.link][block.point]),
+                block.along,
+            )
+            for block in separate_blocks(linkage, closure.structure)
+        }
+        self.links = tuple(carriers)  # Names of the links and blocks, in the order of the frames
+        self._tracker = closure.point_tracker([(link, at) for link, at, _ in carriers.values()])
+        self._angles = [closure.angles[turning] for _, _, turning in carriers.values()]
+
+    def frames_at(self, position: Position) -> list[tuple[Any, Any]]:
+        """Return the origin of each frame, as x + iy in [m], and its angle, in [rad]."""
+        places = self._tracker.places(position)
+        x = position.state.coordinates
+        return [
+            (places[index], x[angle.coordinate] + angle.constant)
+            for index, angle in zip(self._tracker.indices, self._angles, strict=True)
+        ]
+
+    def frame_rates(self, position: Position, velocity: Velocity) -> list[tuple[Any, Any]]:
+        """Return the velocity of each origin, in [m/s], and the rate of the angle, in [rad/s]."""
+        places = self._tracker.places(position)
+        velocities = self._tracker.velocities(position, velocity, places)
+        v = velocity.state.coordinates
+        return [
+            (velocities[index], v[angle.coordinate])
+            for index, angle in zip(self._tracker.indices, self._angles, strict=True)
+        ]
+
+
+def separate_blocks(linkage: Linkage, structure: Structure) -> list[Block]:
+    """Return the blocks that are not links."""
+    links = linkage.links
+    carriers = {point: link for link in reversed(list(links)) for point in links[link]}
+    return [
+        Block(block, slider.along, slider.point, carriers[slider.point])
+        for name, slider in linkage.sliders.items()
+        if (block := structure.blocks[name]) not in links
+    ]

@@ -34,7 +34,6 @@ from linkage_ros.kinematics.plane.dyads.rrr import (
     RRRDyad,
 )
 from linkage_ros.kinematics.plane.dyads.two_sided import TwoSided
-from linkage_ros.kinematics.plane.geared_links import solve_geared_links
 from linkage_ros.kinematics.plane.linkage import Input, Linkage
 from linkage_ros.kinematics.plane.meant_lengths import (
     four_bar_lengths,
@@ -57,6 +56,7 @@ from linkage_ros.kinematics.plane.solved_links import (
     PlanStart,
     Slide,
     SlideLine,
+    solve_geared_links,
     SolvedLinks,
 )
 from linkage_ros.kinematics.plane.topology import (

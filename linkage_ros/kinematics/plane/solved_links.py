@@ -11,15 +11,17 @@ The links that are known so far, their places, and the steps that place their po
 
 Lengths are in the unit of ``scale`` metres: a power of two near the longest length, so that
 scaling causes no rounding error. Each point is placed by its own step, and only if it is needed.
+
+Links that ratios turn against links whose whole turns are known have sums as their angles.
 """
 
 from __future__ import annotations
 
 from cmath import phase, rect
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import frexp, hypot, lcm, ldexp
+from math import frexp, hypot, lcm, ldexp, tau
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.plane.linkage import (
@@ -30,10 +32,16 @@ from linkage_ros.kinematics.plane.linkage import (
     RevoluteJoint,
     SlideJoint,
 )
-from linkage_ros.kinematics.plane.topology import find_followed_links, Joint, Structure
+from linkage_ros.kinematics.plane.topology import (
+    find_followed_links,
+    GearedLinks,
+    Joint,
+    Structure,
+)
 from linkage_ros.kinematics.step import (
     FixedPoint,
     FollowerJoint,
+    GearedAngle,
     PointOnLink,
     PointOnRail,
     Step,
@@ -43,6 +51,8 @@ from linkage_ros.kinematics.step import (
 _MOST_TEETH = 1000
 _ROUNDED = 1e-13
 """A ratio of teeth, both at most this number, and its relative error as a decimal number."""
+
+_Row = dict[int, Fraction]
 
 
 @dataclass(frozen=True, slots=True)
@@ -358,3 +368,76 @@ def _find_scale(links: Iterable[Mapping[str, Point]]) -> float:
         for x, y in places:
             longest = max(longest, hypot(x - places[0][0], y - places[0][1]))
     return ldexp(1.0, frexp(longest)[1]) if longest else 1.0
+
+
+def solve_geared_links(
+    linkage: Linkage,
+    group: GearedLinks,
+    known: Mapping[str, Angle],
+    pose: tuple[Sequence[float], Sequence[float]] | None,
+) -> list[GearedAngle]:
+    """
+    Return the angle of each link of a group.
+
+    Each ratio is an equation Σ a·(angle of the group) = Σ b·x + c with the coordinates x of the
+    ``known`` links. ``pose`` has these coordinates, and roughly the angles of the group: they tell
+    the tooth. Without a pose the joints follow each other by their values as they are written.
+    """
+    matrix: list[list[Fraction]] = []
+    rights: list[_Row] = []  # Factors of the coordinates; −1 has the constant
+    for name in group.ratios:
+        given = linkage.ratios[name]
+        row, right = [Fraction(0)] * len(group.links), {-1: Fraction(given.offset)}
+        for joint, factor in ((name, Fraction(1)), (given.of, -Fraction(given.ratio))):
+            ends = linkage.joints[joint]
+            assert isinstance(ends, RevoluteJoint)
+            for link, by in ((ends.child, factor), (ends.parent, -factor)):
+                if link in group.links:
+                    row[group.links.index(link)] += by
+                else:
+                    angle = known[link]
+                    right[angle.coordinate] = right.get(angle.coordinate, Fraction(0)) - by
+                    right[-1] -= by * Fraction(angle.constant)
+        if pose is not None and (turns := count_turns(given.ratio)):
+            # Without the turns of its links, an angle determines the other one modulo a tooth.
+            x, angles = pose
+            values = [1.0 if k < 0 else x[k] for k in right]
+            off = sum(float(a) * value for a, value in zip(row, angles, strict=True)) - sum(
+                float(b) * value for b, value in zip(right.values(), values, strict=True)
+            )
+            right[-1] += round(off * turns / tau) * Fraction(tau) / turns
+        matrix.append(row)
+        rights.append(right)
+    _eliminate(matrix, rights, group)
+    return [
+        GearedAngle(
+            tuple((k, float(b)) for k, b in sorted(right.items()) if k > 0 and b),
+            float(right[-1]),
+        )
+        for right in rights
+    ]
+
+
+def _eliminate(matrix: list[list[Fraction]], rights: list[_Row], group: GearedLinks) -> None:
+    """Make the matrix that of unity, by rows."""
+    count = len(matrix)
+    for k in range(count):
+        pivot = next((i for i in range(k, count) if matrix[i][k]), None)
+        if pivot is None:
+            raise DefinitionError(
+                f'ratios.{group.ratios[-1]}',
+                f'leaves {group.links[k]!r} free, or locks it',
+                'give another ratio, or let another joint follow',
+            )
+        matrix[k], matrix[pivot] = matrix[pivot], matrix[k]
+        rights[k], rights[pivot] = rights[pivot], rights[k]
+        scale = matrix[k][k]
+        matrix[k] = [value / scale for value in matrix[k]]
+        rights[k] = {n: value / scale for n, value in rights[k].items()}
+        for i in range(count):
+            by = matrix[i][k]
+            if i == k or not by:
+                continue
+            matrix[i] = [a - by * b for a, b in zip(matrix[i], matrix[k], strict=True)]
+            for n, value in rights[k].items():
+                rights[i][n] = rights[i].get(n, Fraction(0)) - by * value

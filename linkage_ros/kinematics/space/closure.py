@@ -5,7 +5,12 @@
 # writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
-"""The loop closure of a spatial linkage: from its inputs to its joints, points and frames."""
+"""
+The loop closure of a spatial linkage: from its inputs to its joints, points and frames.
+
+A plan needs joints that lead from the ground to what only closes together. A platform on six rods
+has none: it is planned on three slides and three hinges from the ground, its place and its turn.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain, pairwise, permutations
-from math import atan2, dist, sqrt, tau
+from math import atan2, dist, fsum, sqrt, tau
 from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
@@ -21,10 +26,9 @@ from linkage_ros.kinematics.analysis.sweep_analysis import grid_positions
 from linkage_ros.kinematics.arithmetic import remainder
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
-from linkage_ros.kinematics.plane.linkage import Limits, SlideJoint, turn_ratios
+from linkage_ros.kinematics.plane.linkage import GROUND, Limits, SlideJoint, turn_ratios
 from linkage_ros.kinematics.results import Acceleration, Near, Plan, Position, Velocity
 from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
-from linkage_ros.kinematics.space.free_platforms import carry_platforms, free_platforms
 from linkage_ros.kinematics.space.idle_turns import hold_idle_turns
 from linkage_ros.kinematics.space.linkage import (
     check_space_linkage,
@@ -37,6 +41,7 @@ from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.kinematics.space.vectors import (
     cross,
     dot,
+    GROUND_FRAME,
     length,
     minus,
     scale,
@@ -45,6 +50,7 @@ from linkage_ros.kinematics.space.vectors import (
 )
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
+from linkage_ros.names import free_name
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.space.freedom import Freedom
@@ -543,3 +549,40 @@ def _shortest_turn(one: Vector, other: Vector) -> Quaternion:
         return 0.0, 0.0, 0.0, 1.0
     x, y, z = scale(0.5 / half, cross(one, other))
     return x, y, z, half
+
+
+def free_platforms(plan: SpacePlan) -> list[str]:
+    """Return the links that a plan does not find, that do not spin, and that only balls hold."""
+    joints = plan.linkage.pair_joints.values()
+    held = {end for joint in joints for end in (joint.parent, joint.child)}
+    rods = plan.carried_points.rods
+    return [
+        link
+        for link in plan.linkage.links
+        if link not in plan.frames and link not in held and link not in rods
+    ]
+
+
+def carry_platforms(
+    linkage: SpaceLinkage, platforms: Sequence[str], whole: SpaceLinkage
+) -> SpaceLinkage:
+    """
+    Return the linkage with joints that lead to these links from the ground.
+
+    No link or joint of the ``whole`` linkage, of which this may be a part, has their names.
+    """
+    taken = {*whole.link_names, *whole.struts, *whole.pair_joints}
+    hinges, slides = dict(linkage.hinges), dict(linkage.slides)
+    for link in platforms:
+        places = [linkage.points[point] for point in linkage.links[link]]
+        x, y, z = (fsum(one) / len(places) for one in zip(*places, strict=True))
+        at, on = (x, y, z), GROUND
+        for prefix, joints in (('', slides), ('r', hinges)):
+            for letter, axis in zip('xyz', GROUND_FRAME[:3], strict=True):
+                name = free_name(f'{link}_{prefix}{letter}', taken)
+                is_last = prefix and letter == 'z'
+                child = link if is_last else free_name(f'{name}_carrier', taken)
+                taken |= {name, child}
+                joints[name] = SpatialJoint(on, child, axis, at)
+                on = child
+    return replace(linkage, hinges=hinges, slides=slides)
