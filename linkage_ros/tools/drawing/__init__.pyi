@@ -20,6 +20,7 @@ from linkage_ros.tools.drawing.animation import (
 from linkage_ros.tools.drawing.draw_command import (
     add_camera as add_camera,
     camera_of as camera_of,
+    reach_lines as reach_lines,
 )
 from linkage_ros.tools.drawing.drawing_data import (
     drawn_in_frames as drawn_in_frames,
@@ -58,7 +59,6 @@ from linkage_ros.tools.drawing.plot_command import (
     is_after_gap as is_after_gap,
     longest_step as longest_step,
 )
-from linkage_ros.tools.drawing.reach import reach_lines as reach_lines
 from linkage_ros.tools.drawing.space_drawing import (
     Camera as Camera,
     choose_camera as choose_camera,

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from linkage_ros.bag import read_run_metadata, RunMetadata
+from linkage_ros.cli import finite_or_none
 from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import LinkageError, quote
 from linkage_ros.kinematics import check_planar, GROUND, PlanarClosure
@@ -79,9 +80,9 @@ class FollowedRun(NamedTuple):
         return {
             't': joints.stamp * 1e-9,
             'age': (now - joints.stamp) * 1e-9,
-            'inputs': [_finite_or_none(value) for value in inputs],
+            'inputs': [finite_or_none(value) for value in inputs],
             'joints': {
-                name: [_finite_or_none(value), _finite_or_none(rate)]
+                name: [finite_or_none(value), finite_or_none(rate)]
                 for name, value, rate in zip(names, joints.angles, rates, strict=True)
             },
             'frames': self._link_frames(known),
@@ -191,7 +192,3 @@ def diagnostics_content(statuses: Sequence[DiagnosticStatus]) -> dict[str, Any]:
 
 def _task_name(status: DiagnosticStatus) -> str:
     return str(status.name.partition(': ')[2])
-
-
-def _finite_or_none(value: float) -> float | None:
-    return value if isfinite(value) else None

@@ -19,6 +19,7 @@ from itertools import chain, combinations
 from math import degrees, dist, inf, isfinite, radians
 from typing import Any, NamedTuple
 
+from linkage_ros.cli import finite_or_none
 from linkage_ros.description import (
     checked_closure,
     find_closures,
@@ -214,8 +215,8 @@ def _motion_json(
             {
                 'name': given.joint,
                 'unit': given.unit,
-                'low': _finite_or_none(given.limits.low),
-                'high': _finite_or_none(given.limits.high),
+                'low': finite_or_none(given.limits.low),
+                'high': finite_or_none(given.limits.high),
                 'value': value,
             }
             for given, value in zip(closure.linkage.inputs, inputs, strict=True)
@@ -287,7 +288,7 @@ def _analyse_linkage(closure: Closure, content: Section) -> dict[str, Any]:
         step = (interval.highest - interval.lowest) / (count - 1)
         values += [interval.lowest + step * i for i in range(count - 1)] + [interval.highest]
     margins = [_quality_at(closure, sweep, value) for value in values]
-    angles, conditioning = ([_finite_or_none(each[i]) for each in margins] for i in (0, 1))
+    angles, conditioning = ([finite_or_none(each[i]) for each in margins] for i in (0, 1))
     return {
         'ranges': [[interval.lowest, interval.highest] for interval in sweep.ranges],
         'toggles': [
@@ -320,11 +321,6 @@ def _linkage_warnings(closure: Closure, content: Section, angles: list[float]) -
     if passed:
         kinds = ' and '.join(dict.fromkeys(each.status.value for each in passed))
         yield f'{kinds} at {len(passed)} input{"s" if len(passed) > 1 else ""}'
-
-
-def _finite_or_none(value: float) -> float | None:
-    """Return a number that JSON can hold; None for one that is not finite."""
-    return value if isfinite(value) else None
 
 
 def compute_pose(closure: Any, inputs: Sequence[float]) -> dict[str, Any]:
