@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
-from math import degrees, isfinite, nan, pi, radians, remainder, tau
+from math import degrees, isfinite, nan, radians
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
@@ -258,12 +258,6 @@ def read_inputs(
     return tuple(
         units.to_si(value, driven.unit) for value, driven in zip(typed, given, strict=True)
     )
-
-
-def wrap_angle(angle: float) -> float:
-    """Return an angle without its full turns, in (−π, π] rad."""
-    rest = remainder(angle, tau)
-    return pi if rest <= -pi else rest
 
 
 def finite_or_none(value: float) -> float | None:

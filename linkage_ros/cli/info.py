@@ -23,7 +23,7 @@ from threading import Event
 from typing import Any
 
 from linkage_ros.bag import Bag, contents_of, layout_of
-from linkage_ros.cli.arguments import add_bag, add_radians, DEGREES, DisplayUnits, wrap_angle
+from linkage_ros.cli.arguments import add_bag, add_radians, DEGREES, DisplayUnits
 from linkage_ros.cli.bag_reading import (
     add_trust,
     bag_json,
@@ -37,6 +37,7 @@ from linkage_ros.cli.table import Column, facts_table, Table, table_of_rows
 from linkage_ros.cli.terminal import show_progress
 from linkage_ros.description import Scene
 from linkage_ros.errors import escape_unprintable, LinkageError
+from linkage_ros.kinematics import wrap_angle
 from linkage_ros.replay import examine_states
 from linkage_ros.signals import heed_signals
 

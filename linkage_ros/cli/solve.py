@@ -34,7 +34,6 @@ from linkage_ros.cli.arguments import (
     read_inputs,
     read_joint_value,
     robot_of,
-    wrap_angle,
 )
 from linkage_ros.cli.result import add_result, Result, show_result
 from linkage_ros.cli.table import Column, Table
@@ -50,6 +49,7 @@ from linkage_ros.kinematics import (
     Status,
     turn_to_pose,
     usual_inputs,
+    wrap_angle,
 )
 from linkage_ros.resources import named_file
 

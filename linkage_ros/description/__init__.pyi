@@ -29,7 +29,6 @@ from linkage_ros.description.grammar import (
 )
 from linkage_ros.description.linkage_file import (
     checked_closure as checked_closure,
-    find_assemblies as find_assemblies,
     find_closures as find_closures,
     is_planar_file as is_planar_file,
     linkage_content as linkage_content,

@@ -325,7 +325,7 @@ def checked_closure(
     return closure
 
 
-def find_assemblies(linkage: str | PathLike[str]) -> dict[str, PlanarClosure]:
+def find_closures(content: Section, name: str) -> dict[str, PlanarClosure]:
     """
     Return a linkage in each choice of assembly sides in which it closes; errors as in `load`.
 
@@ -333,12 +333,6 @@ def find_assemblies(linkage: str | PathLike[str]) -> dict[str, PlanarClosure]:
     kept if it leaves others out, else all are chosen. A FileError says that there is no side to
     choose, or that there are too many.
     """
-    file = named_file(linkage, 'linkages')
-    return find_closures(linkage_content(file), file.stem)
-
-
-def find_closures(content: Section, name: str) -> dict[str, PlanarClosure]:
-    """Return the closures of a linkage file by name, as `find_assemblies` does."""
     written, shorthand = written_linkage(content)
     try:
         structure = assur_groups(written)

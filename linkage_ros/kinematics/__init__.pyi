@@ -104,6 +104,7 @@ from linkage_ros.kinematics.arithmetic import (
     UNIT_ROUNDOFF as UNIT_ROUNDOFF,
     unit_vector as unit_vector,
     where as where,
+    wrap_angle as wrap_angle,
 )
 from linkage_ros.kinematics.batch import (
     Array as Array,

@@ -19,7 +19,7 @@ from __future__ import annotations
 import cmath
 from collections.abc import Callable, Sequence
 import math
-from math import fsum, pi
+from math import fsum, pi, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.status import Status
@@ -174,6 +174,12 @@ def resolve_along(vector: complex, unit: complex) -> tuple[float, float]:
 def acute_angle(angle: float) -> float:
     """Return the acute angle between two lines, given any angle between them, in [rad]."""
     return abs(remainder(angle, pi))
+
+
+def wrap_angle(angle: float) -> float:
+    """Return an angle without its whole turns, in (−π, π] rad."""
+    rest = math.remainder(angle, tau)
+    return pi if rest <= -pi else rest
 
 
 def exact_sum(*lengths: float) -> float:

@@ -14,7 +14,6 @@ from linkage_ros.stages.effects.angle_unwrap import (
     Continuous as Continuous,
     first_values as first_values,
     wrap_all as wrap_all,
-    wrap_angle as wrap_angle,
 )
 from linkage_ros.stages.effects.backlash import (
     BacklashEffect as BacklashEffect,

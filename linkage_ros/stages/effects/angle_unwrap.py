@@ -17,10 +17,10 @@ which may then mix and quantise angles without regard to wrapping; `wrap_all` co
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from math import pi, remainder, tau
+from math import pi, tau
 from operator import add
 
-from linkage_ros.kinematics import Closure
+from linkage_ros.kinematics import Closure, wrap_angle
 from linkage_ros.stages.effects.stage import Sensor, SensorReading
 
 _NO_TURN = -0.0
@@ -92,9 +92,3 @@ def wrap_all(turning: Sequence[bool]) -> Sensor:
         return reading._replace(joints=tuple(now))
 
     return wrap
-
-
-def wrap_angle(angle: float) -> float:
-    """Return an angle without its whole turns, in (−π, π] rad."""
-    rest = remainder(angle, tau)
-    return pi if rest <= -pi else rest

@@ -12,7 +12,8 @@ from fractions import Fraction
 from math import nextafter, pi, tau
 
 from hypothesis import given, strategies as st
-from linkage_ros.stages.effects import Continuous, SensorReading, wrap_all, wrap_angle
+from linkage_ros.kinematics import wrap_angle
+from linkage_ros.stages.effects import Continuous, SensorReading, wrap_all
 import pytest
 
 EXACT_TAU = Fraction('6.28318530717958647692528676655900576839433879875021')

@@ -15,7 +15,7 @@ import re
 from typing import Any
 
 from linkage_ros.cli.main import main
-from linkage_ros.description import find_assemblies, LENGTHS, load
+from linkage_ros.description import find_closures, LENGTHS, linkage_content, load
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import prepare_view, usual_inputs
 from linkage_ros.resources import linkage_names, named_file
@@ -163,6 +163,11 @@ links:
 input: {joint: crank_joint, parent: ground, child: crank}
 joints: {rocker_joint: {parent: ground, child: rocker}}
 """
+
+
+def find_assemblies(linkage):
+    file = named_file(linkage, 'linkages')
+    return find_closures(linkage_content(file), file.stem)
 
 
 def test_assemblies_vary_the_sides_missing_in_the_file(tmp_path):
