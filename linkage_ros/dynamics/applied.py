@@ -290,15 +290,7 @@ class AppliedForces:
             if fastest > worst:
                 worst = fastest
                 blamed = max(touched, key=lambda key: yielding[key].stiffness * touched[key] ** 2)
-        check_step(
-            f'loads.{blamed}',
-            worst,
-            method,
-            step,
-            'it is too stiff',
-            'write a smaller stiffness or damping',
-            EXACT,
-        )
+        _check_stiffness(blamed, worst, method, step)
 
     def check_step_at(
         self,
@@ -334,15 +326,7 @@ class AppliedForces:
         fastest = [
             float(np.linalg.eigvals(moved_by @ of).real.max()) for of in (stiffness, damping)
         ]
-        check_step(
-            f'loads.{blamed}',
-            _fastest_eigenvalue(*fastest),
-            method,
-            step,
-            'it is too stiff',
-            'write a smaller stiffness or damping',
-            EXACT,
-        )
+        _check_stiffness(blamed, _fastest_eigenvalue(*fastest), method, step)
 
     @property
     def _yielding(self) -> dict[str, JointSpring | SoftStop]:
@@ -506,6 +490,11 @@ class AppliedForces:
 def _law_force(law: Law, value: float, rate: float, seconds: float) -> tuple[float]:
     """Return the force by a law, for `call`."""
     return (law.force(law.segment(value, rate, seconds), value, rate, seconds),)
+
+
+def _check_stiffness(blamed: str, fastest: float, method: str, step: float) -> None:
+    remedy = 'write a smaller stiffness or damping'
+    check_step(f'loads.{blamed}', fastest, method, step, 'it is too stiff', remedy, EXACT)
 
 
 def _fastest_eigenvalue(stiffness: float, damping: float) -> float:

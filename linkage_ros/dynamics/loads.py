@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from linkage_ros.description import choice, components, each_part, number, number_rows, text
 from linkage_ros.errors import DefinitionError, list_names, quote
@@ -29,6 +29,8 @@ GREATEST_LOAD, STIFFEST = 1e9, 1e12
 """Bounds on loads, in [N], [N·m], [m] and [kg·m²], and on stiffness and damping, in SI units."""
 
 _EFFORT = 'N·m or N'
+_PART: Mapping[str, Any] = {'default': (), 'most': GREATEST_LOAD}
+"""Default and bound of each table of a load."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,22 +89,15 @@ class JointLoad:
         'constant part', 0.0, unit=_EFFORT, least=-GREATEST_LOAD, most=GREATEST_LOAD
     )
     over_time: tuple[tuple[float, float], ...] = number_rows(
-        'part over the time since the first pose',
-        ('time [s]', f'effort [{_EFFORT}]'),
-        default=(),
-        most=GREATEST_LOAD,
+        'part over the time since the first pose', ('time [s]', f'effort [{_EFFORT}]'), **_PART
     )
     over_position: tuple[tuple[float, float], ...] = number_rows(
         'part over the position of the joint',
         ('position [rad or m]', f'effort [{_EFFORT}]'),
-        default=(),
-        most=GREATEST_LOAD,
+        **_PART,
     )
     over_rate: tuple[tuple[float, float], ...] = number_rows(
-        'part over the rate of the joint',
-        ('rate [rad/s or m/s]', f'effort [{_EFFORT}]'),
-        default=(),
-        most=GREATEST_LOAD,
+        'part over the rate of the joint', ('rate [rad/s or m/s]', f'effort [{_EFFORT}]'), **_PART
     )
 
 
@@ -118,22 +113,13 @@ class PointLoad:
         'constant part', 0.0, unit='N', least=-GREATEST_LOAD, most=GREATEST_LOAD
     )
     over_time: tuple[tuple[float, float], ...] = number_rows(
-        'part over the time since the first pose',
-        ('time [s]', 'force [N]'),
-        default=(),
-        most=GREATEST_LOAD,
+        'part over the time since the first pose', ('time [s]', 'force [N]'), **_PART
     )
     over_position: tuple[tuple[float, float], ...] = number_rows(
-        'part over the position of the input',
-        ('position [rad or m]', 'force [N]'),
-        default=(),
-        most=GREATEST_LOAD,
+        'part over the position of the input', ('position [rad or m]', 'force [N]'), **_PART
     )
     over_rate: tuple[tuple[float, float], ...] = number_rows(
-        'part over the rate of the input',
-        ('rate [rad/s or m/s]', 'force [N]'),
-        default=(),
-        most=GREATEST_LOAD,
+        'part over the rate of the input', ('rate [rad/s or m/s]', 'force [N]'), **_PART
     )
 
 

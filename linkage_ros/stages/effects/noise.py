@@ -103,7 +103,7 @@ class NoiseEffect(SensorEffect):
         """
         Build the sensor.
 
-        Raise `DefinitionError` if self of a joint exclude or lack each other, or if a density
+        Raise `DefinitionError` if kinds of noise of a joint exclude or lack each other, or a density
         has no rate.
         """
         for joint, noise in self.joints.items():
