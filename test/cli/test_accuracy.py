@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from pkgutil import resolve_name
 import re
 from threading import Event
 from typing import Any
@@ -31,6 +32,19 @@ def run(*arguments: str, stop: Event | None = None) -> int:
     parser = argparse.ArgumentParser()
     command.add_arguments(parser)
     return command.run(parser.parse_args(arguments), stop or Event())
+
+
+@pytest.fixture(autouse=True)
+def short_prices(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let prices be measured for a moment: none is judged here."""
+    prices = 'linkage_ros.tools.study.prices'
+    time_ticks = resolve_name(f'{prices}:time_ticks')
+
+    def time_briefly(scenes: Any, _seconds: float, *others: Any, **options: Any) -> Any:
+        return time_ticks(scenes, 0.01, *others, **options)
+
+    monkeypatch.setattr(f'{prices}.time_ticks', time_briefly)
+    monkeypatch.setattr(f'{prices}._ROUNDS', 3)
 
 
 @pytest.fixture
@@ -121,7 +135,7 @@ def test_effects_of_several_inputs_have_their_prices(
     source = f'linkage: {linkage}\ndrive: {{topic: {{}}}}\neffects: {{velocity: {{}}}}\n'
     (file := tmp_path / 'scene.yaml').write_text(source)
     scene = 'torque_ankle' if linkage == 'torque' else str(file)
-    assert run(scene, '--quick', '--only', 'effects', '--json') == 0
+    assert run(scene, '--quick', '--only', 'effects', '--horizon', '0.1', '--json') == 0
     names = [each['name'] for each in json.loads(capsys.readouterr().out)['sources']]
     assert 'velocity' in names
 

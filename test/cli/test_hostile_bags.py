@@ -319,7 +319,7 @@ FOLLOWS = 'linkage: l.yaml\ndrive: {bag: {file: bag}}\n'
 
 WITH_A_SCENE = (
     ['scene', 'follows.yaml'],
-    ['accuracy', 'follows.yaml', '--quick', '--only', 'errors'],
+    ['accuracy', 'follows.yaml', '--quick', '--only', 'errors', '--horizon', '0.05'],
 )
 
 

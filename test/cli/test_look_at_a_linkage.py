@@ -147,21 +147,21 @@ def test_draw_draws_every_shipped_linkage(linkage: Run, tmp_path: Path, name: st
 
 
 def test_repeated_drawing_gives_the_same_bytes(tmp_path: Path) -> None:
+    code = (
+        'import sys\nfrom linkage_ros.cli.main import main\n'
+        'for kind in ("svg", "png"):\n'
+        f'    main(["draw", {FOUR_BAR!r}, "-o", f"{{sys.argv[1]}}.{{kind}}", "--at", "40"])\n'
+    )
+    for seed in '01':
+        subprocess.run(
+            [sys.executable, '-c', code, seed],
+            cwd=tmp_path,
+            env=environment(tmp_path) | {'PYTHONHASHSEED': seed},
+            check=True,
+        )
     for kind in ('svg', 'png'):
-        drawn = []
-        for index in range(2):
-            file = tmp_path / f'{index}.{kind}'
-            subprocess.run(
-                [
-                    *(sys.executable, '-m', 'linkage_ros.cli.main'),
-                    *('draw', FOUR_BAR, '-o', str(file), '--at', '40'),
-                ],
-                cwd=tmp_path,
-                env=environment(tmp_path) | {'PYTHONHASHSEED': str(index)},
-                check=True,
-            )
-            drawn.append(file.read_bytes())
-        assert drawn[0] == drawn[1]
+        first, second = ((tmp_path / f'{seed}.{kind}').read_bytes() for seed in '01')
+        assert first == second
 
 
 def test_draw_takes_several_poses(linkage: Run, tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ PLACES = {
 }
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('place', PLACES)
 @pytest.mark.parametrize('command', COMMANDS)
 def test_commands_show_no_traceback_for_any_output(tmp_path, command, place) -> None:
@@ -116,6 +116,7 @@ IMPORTED = (
 )
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize('name', IMPORTED)
 def test_signal_during_an_import_is_reported_in_one_line(tmp_path, name, number) -> None:

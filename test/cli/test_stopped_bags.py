@@ -21,13 +21,14 @@ import pytest
 import yaml
 
 from ..support.commands import environment, linkage
+from ..support.sampling import sample_count
 
 SIGNALS = 'SIGINT', 'SIGTERM', 'SIGHUP'
 
-MOMENTS = 12
+MOMENTS = sample_count(12, 3)
 """Writes within records at which each command is stopped, for each signal."""
 
-INSTANTS = 6
+INSTANTS = sample_count(6, 3)
 """Random instants at which each command is stopped."""
 
 COMMANDS = {
@@ -81,7 +82,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / 'four.yaml').write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n')
     (folder / 'demo.yaml').write_text(SCENE % 'constant_rate: {rate: 6.0}')
     (folder / 'crank.yaml').write_text(SCENE % 'topic: {}')
-    for name, seconds in (('short', 0.05), ('long', 8.0)):
+    for name, seconds in (('short', 0.05), ('long', sample_count(8, 3))):
         made = linkage(
             folder, 'simulate', 'demo.yaml', '--seconds', f'{seconds}', '-o', f'{name}_run'
         )
