@@ -80,7 +80,7 @@ def test_commands_succeed_or_refuse_in_one_line(tallies: Tallies, test: str) -> 
 @pytest.mark.parametrize('family', [name for name in FAMILIES if name.startswith('class III')])
 def test_random_platforms_have_no_findings(family: str) -> None:
     """Platforms on rails fix angles up to whole turns, which no dyad does."""
-    work = parts(SEED, {KINEMATICS: 2}, [family])
+    work = parts(SEED, {KINEMATICS: sample_count(2, 1)}, [family])
     tally = tallies_of(judge_part, work, jobs=1)[KINEMATICS][family]
     assert not tally.notes, notes_of(tally, family, KINEMATICS)
 

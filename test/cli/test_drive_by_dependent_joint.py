@@ -109,6 +109,7 @@ def test_crank_rate_at_a_turning_rocker_comes_from_differences() -> None:
     assert rate == pytest.approx((cranks[1] - cranks[0]) / 1e-3)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('joint', ['P.x', 'O2-B', 'coupler.angle'])
 def test_samples_drive_by_coordinate_distance_or_angle(joint: str) -> None:
     (branch, *_) = LINKAGE.branches(joint)
@@ -122,6 +123,7 @@ def test_samples_drive_by_coordinate_distance_or_angle(joint: str) -> None:
     assert moved['crank_joint'] == pytest.approx(crank, abs=1e-12)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ('name', 'joints', 'start'),
     [

@@ -79,7 +79,7 @@ def test_help_ends_with_an_example(command: str) -> None:
 
 
 # A topic needs a publisher: test/node/test_echo.py has one.
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('command', [name for name in COMMANDS if name != 'echo'])
 def test_example_of_the_help_exits_with_code_0(folder: Path, command: str) -> None:
     line = example(command)
@@ -416,6 +416,7 @@ COMPLETED = {
 }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('line', COMPLETED)
 def test_shell_completes_commands_options_names_and_files(tmp_path: Path, line: str) -> None:
     pytest.importorskip('argcomplete')

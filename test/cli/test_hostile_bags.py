@@ -110,6 +110,7 @@ def tried(bag: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> Iterat
             assert each.isprintable()
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', ACCOUNTS)
 def test_damaged_run_json_is_reported_in_one_line(tmp_path, capsys, bag, name) -> None:
     odd = with_account(bag, tmp_path, ACCOUNTS[name])
@@ -117,7 +118,7 @@ def test_damaged_run_json_is_reported_in_one_line(tmp_path, capsys, bag, name) -
     assert lines[0].startswith(f'{odd}: its run.json is damaged; ')
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('value', VALUES)
 @pytest.mark.parametrize('key', KEYS)
 def test_wrong_run_json_value_is_reported_in_one_line(tmp_path, capsys, bag, key, value) -> None:
@@ -222,7 +223,7 @@ def odd_bag(folder: Path, odd: str) -> Path:
     )
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ODD)
 def test_commands_print_no_control_characters_of_a_bag(tmp_path: Path, name: str) -> None:
     odd_bag(tmp_path, ODD[name])
@@ -399,6 +400,7 @@ def test_report_names_the_effect_that_was_not_imported(folder: Path) -> None:
     )
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('command', ['info', 'report', 'plot', 'replay'])
 def test_trust_effects_prints_the_module_before_the_import(folder: Path, command: str) -> None:
     force = ['--force'] * (command in {'report', 'plot'})

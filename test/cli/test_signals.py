@@ -168,7 +168,7 @@ def stuck_at(folder: Path, place: str, *arguments: str) -> subprocess.Popen[str]
     return start(folder, PROGRAM, place, separator, *arguments)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('command', READS)
 def test_signal_ends_a_command_while_it_reads(folder, command, number) -> None:
@@ -179,7 +179,7 @@ def test_signal_ends_a_command_while_it_reads(folder, command, number) -> None:
     assert sorted(folder.iterdir()) == before
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('at', [PARSE, 'linkage_ros.kinematics.closure:singular_inputs'])
 def test_signal_ends_a_run_before_its_first_tick(folder, at, number) -> None:
@@ -187,7 +187,7 @@ def test_signal_ends_a_run_before_its_first_tick(folder, at, number) -> None:
     assert found == (1, 'linkage run: stopped\n')
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('command', COMPUTE)
 def test_signal_ends_a_command_while_it_computes(folder, command, number) -> None:
@@ -300,7 +300,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('command', COMMANDS)
 def test_signal_ends_the_search_of_a_large_bag(tmp_path, large, command) -> None:
     typed, said = COMMANDS[command]

@@ -180,6 +180,7 @@ def test_array_module_holds_only_requested_derivatives_and_joints(derivatives):
     assert np.ravel(groups) == pytest.approx(steps[: 1 + derivatives], rel=1e-14)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('limits', [(-0.1, 0.9), (-0.9, 0.1)])
 def test_array_module_solves_in_narrow_cells_near_a_limit(limits):
     """Next to the end of an ankle's motion only narrow cells are proven, and then none."""
@@ -284,7 +285,7 @@ def beside_toggles(closure: Closure) -> list[State]:
     return [(value, 1.0, 0.0) for value in values if closure.position(value).status.has_rates]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', ALL)
 @pytest.mark.parametrize('library', LIBRARIES)
@@ -338,6 +339,7 @@ np.save('gradients.npy', np.concatenate(gradients, axis=1))
 """
 
 
+@pytest.mark.sample(1)
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('library', LIBRARIES)
 @pytest.mark.parametrize(

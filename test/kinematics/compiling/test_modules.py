@@ -238,6 +238,7 @@ def test_javascript_module_returns_the_status_of_joint_limits(tmp_path):
     assert off(what, told, given) <= _ULPS
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ('make', 'reach'),
     [(partial(closure_of, 'ankle_motors'), 0.6), (planar_group_of_two_inputs, 0.2)],
@@ -277,6 +278,7 @@ DRIVEN = {
 """For each linkage the joints that drive it instead of its crank."""
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('run', [run_python, pytest.param(run_c, marks=needs['C99'])])
 @pytest.mark.parametrize(
     ('name', 'joint'), [(name, joint) for name, joints in DRIVEN.items() for joint in joints]

@@ -56,6 +56,7 @@ def count_searches(monkeypatch):
     return searches
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('case', CASES)
 def test_unreachable_state_is_searched_only_once(monkeypatch, case):
     closure, beyond = case()

@@ -273,6 +273,7 @@ def change_points_of(closure: Closure) -> list[float]:
     return [place for place, status in closure.singular_inputs if status is Status.CHANGE_POINT]
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('kind', [*SPHERICAL, *RODS])
 def test_folding_linkage_follows_the_smooth_way(kind: str) -> None:
     for number in range(COUNT):
@@ -288,6 +289,7 @@ def test_folding_linkage_follows_the_smooth_way(kind: str) -> None:
                 assert abs(made.apart(found[made.joint], value)) < 1e-7, (number, count)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('kind', [*SPHERICAL, *RODS])
 def test_rates_at_change_points_are_those_of_the_smooth_way(kind: str) -> None:
     step = 1e-3
@@ -313,6 +315,7 @@ def test_rates_at_change_points_are_those_of_the_smooth_way(kind: str) -> None:
             assert acceleration[made.joint] == pytest.approx(bend, rel=1e-3, abs=1e-3)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('kind', [*SPHERICAL, *RODS])
 def test_singular_inputs_name_where_the_links_lie_in_line(kind: str) -> None:
     """Both ways of the reference meet there; or they are undefined, as in a kite."""
@@ -330,6 +333,7 @@ def test_singular_inputs_name_where_the_links_lie_in_line(kind: str) -> None:
             assert not closure.position(place).joints
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('kind', [*SPHERICAL, *RODS])
 def test_arrays_and_compiled_code_pass_change_points_alike(kind: str) -> None:
     made = draw(kind, 1)
@@ -355,6 +359,7 @@ def test_single_change_point_repeats_after_two_turns() -> None:
     assert abs(made.apart(once, again)) > 0.1
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('kind', ['parallelogram', 'kite on its side', 'rhombus', *RODS])
 def test_rounded_coordinates_pass_the_same_change_points(kind: str) -> None:
     made = draw(kind, 1)

@@ -44,6 +44,7 @@ def random_inputs(closure, count, reach):
     ]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', BOTH_WAYS)
 def test_inverse_linkage_returns_the_inputs(name):
     there, back = closure_of(name), closure_of(BOTH_WAYS[name])
@@ -114,6 +115,7 @@ def test_cells_within_limits_cover_all_solved_states():
     assert closure_of('hexapod').grids[0].fill() is None
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('ahead', [True, False])
 def test_cells_made_ahead_serve_a_hexapod_in_motion(monkeypatch, ahead):
     closure, made, counts = closure_of('hexapod'), [], []

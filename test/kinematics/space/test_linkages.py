@@ -90,6 +90,7 @@ def joints_at(closure, inputs):
     return np.array(closure.position(*inputs).joints)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', NAMES)
 def test_drawn_pose_is_solved_at_its_inputs(name):
     closure = shared_closure(name)
@@ -159,6 +160,7 @@ def _rotate(quaternion, vector):
     return vector + 2.0 * (w * once + np.cross(axis, once))
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', NAMES)
 def test_compiled_spatial_linkages_equal_the_steps(name):
     closure = shared_closure(name)

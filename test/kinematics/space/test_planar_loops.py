@@ -188,6 +188,7 @@ def mirrored(kind: str, linkage: Linkage, at: dict[str, complex]) -> dict[str, c
     }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('hips', [0, 1, 2])
 @pytest.mark.parametrize('kind', FLAT)
 def test_planar_loop_passes_change_points_without_a_jump(kind, hips):
@@ -216,6 +217,7 @@ def test_planar_loop_passes_change_points_without_a_jump(kind, hips):
 
 
 # A swivel may be passed closely, so that lengths are as they are written.
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ('kind', 'digits'),
     [
@@ -320,6 +322,7 @@ GALLERY = [name for name in KINDS if name not in ('class_3', 'gripper')]
 """Linkages of the gallery without links that are iterated, and without gears."""
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('hips', [0, 1])
 @pytest.mark.parametrize('name', GALLERY)
 def test_gallery_linkage_in_space_equals_the_planar_one(name, hips):

@@ -58,6 +58,7 @@ def by_frames(closure, points, position):
     return np.array(places), np.array(turns)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', NAMES)
 def test_point_velocities_and_accelerations_equal_numerical_derivatives(name):
     closure = closure_of(name)

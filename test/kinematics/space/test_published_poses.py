@@ -116,7 +116,7 @@ def hexapod(folder, place, turn):
     )
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('number', range(1, len(POSTURES) + 1))
 def test_hexapod_reaches_all_forty_published_postures(tmp_path, number):
     """Each is reached from a pose that is drawn beside it: two digits of it, or four."""

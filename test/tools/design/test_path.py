@@ -78,7 +78,7 @@ ROUND = np.arange(24) * 15.0
 HALF = np.linspace(80.0, 280.0, 21)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ('name', 'degrees', 'closed', 'timed'),
     [
@@ -143,7 +143,7 @@ NEAR_A_CIRCLE = (
 ON_A_LINE = (0.50 + 1.06j, -0.83 - 0.27j, -0.34 + 0.22j, -0.13 + 0.43j, 0.22 + 0.78j)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ('points', 'closed', 'error'),
     [
@@ -185,7 +185,7 @@ ARC = (3.0 + 3.0j, 2.759 + 3.363j, 2.372 + 3.663j, 1.890 + 3.862j, 1.355 + 3.943
 THIRTIES = tuple(radians(30.0 * i) for i in range(1, 6))
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('zero_free', [True, False])
 @pytest.mark.parametrize(
     ('points', 'closed', 'timing'), [(EGG, True, TWENTIES), (ARC, False, THIRTIES)]

@@ -123,6 +123,7 @@ def test_pickled_path_problem_scores_the_same(aim, closed):
     assert (problem.score(candidates[5:9]) == scores[5:9]).all()
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('guard', [0.0, 1e-3])
 @pytest.mark.parametrize(('aim', 'closed'), AIMS.values(), ids=AIMS)
 def test_path_improvement_keeps_timing_and_bounds(aim, closed, guard):

@@ -152,6 +152,7 @@ def test_numbers_of_a_design_picture_do_not_overlap(name):
             assert box.y1 <= frame.y1
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', [name for name in DESIGNS if 'places' not in name])
 def test_design_marks_lie_at_the_wanted_angles(name):
     design = DESIGNS[name]

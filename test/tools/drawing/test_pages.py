@@ -43,6 +43,7 @@ def page():
     return (ROOT / 'docs' / 'gallery.md').read_text('utf-8')
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_gallery_chapter_equals_its_linkage_file(page, file):
     picture = ROOT / 'docs' / 'gallery' / f'{file.stem}.png'

@@ -54,6 +54,7 @@ def states_of(closure):
     return start + np.linspace(-7.0, 7.0, 71)[:, None] * steps
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize('plane', PLANES)
 @pytest.mark.parametrize('name', linkage_names())
 def test_planar_robot_has_the_states_of_the_file(tmp_path, name, plane):

@@ -89,6 +89,7 @@ def test_cad_noise_and_joint_order_change_no_pose(tmp_path, models, name, powers
     check_poses(name, load(file), random, size)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['bennett', 'wishbone'])
 def test_rounded_robot_is_right_or_refused(tmp_path, name):
     """A point of two links may be next to the axis of their hinge, or miss it."""

@@ -159,6 +159,7 @@ def pose_of(closure):
     return dict(zip((*closure.input_names, *names), (*inputs, *joints), strict=True))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', CHOICES)
 def test_robot_states_equal_newtons_method_on_the_urdf(name):
     told, loops, reach = CHOICES[name]
@@ -203,6 +204,7 @@ AXES = {'urdfdom': '<parent_axis xyz="0 0 1"/><child_axis xyz="0 0 2"/>'}
 OPEN = re.compile(r'<(loop_joint|loop|constraint)\b.*</\1>', re.DOTALL)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('kind', ['spherical', 'revolute'])
 @pytest.mark.parametrize('dialect', [*TAGS, 'close'])
 def test_loop_tag_dialects_give_the_same_states(tmp_path, dialect, kind):
@@ -341,6 +343,7 @@ def test_rounded_loops_are_closed_without_changing_links(tmp_path):
     assert 1e-5 < max(map(abs, pose.values())) < 1e-2
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('rounding', [1e-16, 1e-13, 1e-9, 1e-6])
 def test_pose_at_a_limit_tolerates_loop_rounding(tmp_path, rounding, turns):
     """Each joint that the loops move has a limit of 0, above or below, where it is in the pose."""
@@ -391,7 +394,7 @@ def hexapod(tmp_path_factory):
     return model_and_robot('hexapod', tmp_path_factory.mktemp('hexapod'))
 
 
-@pytest.mark.sample(7)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name', [*spatial_linkage_names(), *STRUTS])
 def test_spatial_linkage_survives_the_urdf_round_trip(tmp_path, name, request):
     file = STRUTS.get(name, name)
@@ -568,6 +571,7 @@ def angle_between(kind, rpy):
     return np.arccos(np.clip((np.trace(turned) - 1) / 2, -1, 1))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', ['fixed', 'revolute', 'prismatic'])
 def test_misaligned_closing_frames_are_refused(tmp_path, kind, turns):
     for _ in range(4):

@@ -129,7 +129,7 @@ def described(closure, joints, commanded, reductions, offsets=None):
     return [*lines, 'configure']
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', CASES)
 def test_transmission_maps_motors_to_joints_and_back(programs, name):
     """Numbers are those of the closure; efforts are those of virtual work."""

@@ -110,6 +110,7 @@ def test_sensors_read_the_edited_linkage() -> None:
     assert turned(sensors('{}', '60', longer), 3) != turned(sensors('{}', '60'), 3)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', scene_names())
 def test_sensors_read_every_shipped_planar_scene(name: str) -> None:
     scene = load_scene(name)

@@ -151,6 +151,7 @@ VOLTAGE = (
 
 # Scenes that move by themselves, with noise, delays and forces; from samples; by efforts; with
 # faults, several linkages, and a sliding input.
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(
     ('name', 'settings'),
     [

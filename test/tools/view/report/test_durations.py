@@ -85,6 +85,7 @@ LATE = {
 }
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('name', LATE)
 @pytest.mark.parametrize('piece', [1, 700, 10**6])
 def test_lateness_of_ticks_is_exact_to_a_nanosecond(name, piece):

@@ -67,6 +67,7 @@ def some(closure):
     return zip(*((each, position) for each, position in found if position.joints), strict=True)
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_report_points_equal_those_of_the_closure(file):
     closure = closure_of(file)
