@@ -13,6 +13,7 @@ from collections.abc import Generator, Iterator
 import gc
 from importlib.util import find_spec
 from math import inf
+import os
 import re
 from typing import Any
 
@@ -23,6 +24,11 @@ import pytest
 from .browser import chromium
 from .support.missing_packages import missing_package
 from .support.sampling import choose_covering, EXAMPLES, TAKES_ALL
+
+# Before numpy is imported, here and in processes that tests start. The threads of OpenBLAS wait
+# for each other in loops, while tests of other processes need the core: matrices here are small.
+# A forked child with such threads, whose scipy is loaded later, does not end.
+os.environ['OPENBLAS_NUM_THREADS'] = '1'
 
 _skipped: set[str] = set()
 

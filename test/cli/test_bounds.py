@@ -52,7 +52,7 @@ def told(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, '-m', 'linkage_ros.cli.main', *words],
         cwd=folder,
-        env=environment(folder) | {'OPENBLAS_NUM_THREADS': '1'},
+        env=environment(folder),
         capture_output=True,
         text=True,
         timeout=200,

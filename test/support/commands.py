@@ -53,9 +53,6 @@ LIBRARIES = (
 # Their import starts threads, which a child would lack: each imports them for itself.
 THREADED = ('pyarrow', 'rclpy')
 
-# With threads of OpenBLAS, a forked child whose scipy is loaded later does not end.
-_NO_THREADS = {'OPENBLAS_NUM_THREADS': '1'}
-
 _NUMBER = struct.Struct('i')
 
 
@@ -81,7 +78,7 @@ def linkage(
     request = {
         'arguments': arguments,
         'folder': str(folder),
-        'environment': environment(folder) | _NO_THREADS | variables,
+        'environment': environment(folder) | variables,
     }
     server = _server()
     pid = 0
@@ -125,7 +122,6 @@ def _server() -> socket.socket:
         subprocess.Popen(
             [sys.executable, __file__, str(number)],
             pass_fds=[number],
-            env=os.environ | _NO_THREADS,
         )
     return ours
 
