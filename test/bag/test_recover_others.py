@@ -128,6 +128,7 @@ def forged(file: Path, data: bytes, size: int, compression: str = 'zstd') -> Pat
     return file
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ('size', 'reason'),
     [

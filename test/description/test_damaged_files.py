@@ -22,6 +22,7 @@ import pytest
 import yaml
 
 from .conftest import CONFIG, is_one_line
+from ..support.sampling import sample_count
 
 # The shipped files, damaged at random: each still runs, or is refused in one line.
 
@@ -44,7 +45,6 @@ def either_runs_or_says_why(files: dict[str, bytes]) -> None:
     pipeline.tick(1)
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_scene_with_damaged_bytes_runs_or_is_refused(data):
     shipped = data.draw(st.sampled_from(SHIPPED))
@@ -79,7 +79,6 @@ def places(content, path=()):
             yield from places(value, (*path, key))
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_scene_with_damaged_keys_runs_or_is_refused(data):
     shipped = data.draw(st.sampled_from(SHIPPED))
@@ -178,7 +177,9 @@ def read(name: str, content: Any) -> Linkage | FileError:
 
 
 @settings(
-    derandomize=True, deadline=None, max_examples=600, suppress_health_check=list(HealthCheck)
+    derandomize=True,
+    max_examples=sample_count(600, 100),
+    suppress_health_check=list(HealthCheck),
 )
 @given(spoilt())
 def test_damaged_linkage_file_is_solved_or_refused(case):

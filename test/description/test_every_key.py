@@ -222,6 +222,7 @@ def read_text(text):
     return read_any_closure(parse_yaml(text.encode(), 'file.yaml'))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('name', 'within'), [*((name, ()) for name in WHOLE), ('gallery hexapod', ('balls',))]
 )

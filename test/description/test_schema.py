@@ -192,7 +192,6 @@ def files_of(path: Path) -> dict[str, Any]:
 SHIPPED = [files_of(path) for path in SCENES]
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_schema_accepts_all_files_the_reader_accepts(data, valid):
     contents = deepcopy(data.draw(st.sampled_from(SHIPPED)))

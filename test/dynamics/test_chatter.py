@@ -80,6 +80,7 @@ def test_chattering_step_stays_within_its_evaluation_bound(name):
     assert asked <= most * (STEPS + 60)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('restitution', [0.5, 1.0])
 @pytest.mark.parametrize('inertia', [2e-4, 1e-6])
 def test_chattering_step_of_several_inputs_stays_within_bound(restitution, inertia):

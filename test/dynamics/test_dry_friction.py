@@ -250,6 +250,7 @@ def roll_levers(closure, values):
     return np.array([closure.velocity(position, *unit).joints[joint] for unit in units])
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('restitution', [1.0, 0.5, 0.0])
 def test_dependent_joint_bounces_at_its_hard_stop(restitution):
     closure, start, moved = stopped_foot(restitution)

@@ -73,6 +73,7 @@ def check_forces(reactions, closure, state, given, wrenches):
     return checked
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', NAMES)
 def test_spatial_joint_forces_equal_lagrange_multipliers(name):
     closure, spring = spring_of(weighed(name), 3.0)
@@ -214,6 +215,7 @@ RUBBING = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', RUBBING)
 def test_load_dependent_friction_equals_a_fixed_point_iteration(name):
     closure = weighed(name)
@@ -227,6 +229,7 @@ def test_load_dependent_friction_equals_a_fixed_point_iteration(name):
         assert np.abs(np.subtract(found, rigid)).max() > 1e-4
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['rssr', 'spatial_slider_crank'])
 def test_torque_command_equals_the_effort_of_its_acceleration(name):
     closure = weighed(name)

@@ -112,6 +112,7 @@ def rubbing_everywhere(name):
     }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name', STATES)
 def test_load_dependent_friction_equals_constant_friction_of_that_size(name):
     # With each friction written as a constant, the forces, and the work, are the same.
@@ -222,6 +223,7 @@ def test_rubbing_pendulum_rests_within_its_friction_circle():
     assert abs(value + pi / 2.0) < 0.02
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name', [name for name in STATES if name != 'five_bar'])
 def test_torque_command_equals_the_effort_of_its_acceleration(name):
     closure, joints = rubbing_everywhere(name)

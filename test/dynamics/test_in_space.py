@@ -124,6 +124,7 @@ def test_spatial_drive_efforts_equal_lagrange_multipliers(name):
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(expected).max())
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', NAMES)
 def test_spatial_drive_power_equals_the_energy_rate(name):
     closure, spring = spring_of(weighed(name))

@@ -101,6 +101,7 @@ def by_multipliers(closure, start, until, efforts, loads=lambda _: ()):
     return solve_ivp(slope, (0.0, until), start, method='DOP853', rtol=1e-8, atol=1e-10).y[:, -1]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ('name', 'efforts'),
     [
@@ -132,6 +133,7 @@ def test_several_inputs_move_as_in_absolute_coordinates(name, efforts):
     assert (*state.value, *state.rate) == pytest.approx(tuple(expected), rel=1e-6, abs=1e-8)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(('method', 'within'), [('rk4', 1e-7), ('gauss_legendre', 1e-11)])
 @pytest.mark.parametrize('name', ['five_bar', 'delta', 'ankle'])
 def test_undamped_linkage_of_several_inputs_keeps_energy(name, method, within):

@@ -132,6 +132,7 @@ def busy():
     sys.setswitchinterval(usual)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.usefixtures('busy')
 @pytest.mark.parametrize('name', ['four_bar', 'excavator_bucket', 'jansen_leg'])
 def test_concurrent_first_solutions_are_equal(name):

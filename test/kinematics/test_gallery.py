@@ -14,6 +14,7 @@ inputs, in the frame of the ground. They come from Newton's method on the poses 
 this package. Every constraint is met there to 1e-16 m.
 """
 
+from functools import cache
 import json
 from math import radians, remainder, sqrt, tau
 from pathlib import Path
@@ -53,7 +54,9 @@ KINDS = {
 }
 
 
+@cache
 def closure_of(name: str) -> Closure:
+    """Return a shipped linkage, built once in a process."""
     closure: Closure = load(name)
     return closure
 

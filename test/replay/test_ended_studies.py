@@ -95,7 +95,7 @@ def test_a_killed_worker_loses_no_finished_run(capsys):
     check_goes_on(kept, capsys)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('workers', ['1', '2'])
 @pytest.mark.parametrize('ended_by', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_stopped_study_continues_with_the_same_command(ended_by, workers, capsys):

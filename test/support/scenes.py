@@ -8,6 +8,7 @@
 
 """Linkages, scenes and pipelines from the text of their files, and the shipped linkages."""
 
+from functools import cache
 from pathlib import Path
 
 from linkage_ros.description import parse_scene, parse_yaml, read_linkage, Scene
@@ -102,13 +103,15 @@ def _bytes(text: str | bytes) -> bytes:
     return text.encode() if isinstance(text, str) else text
 
 
+@cache
 def linkage_of(text: str | bytes) -> Linkage:
     """Return the linkage of a file with this text."""
     return read_linkage(parse_yaml(_bytes(text), 'linkage.yaml'))
 
 
+@cache
 def closure_of(text: str | bytes) -> Closure:
-    """Return the closure of a linkage file with this text."""
+    """Return the closure of a linkage file with this text, built once in a process."""
     return Closure(linkage_of(text))
 
 

@@ -116,7 +116,7 @@ def check(linkage, scene, looked=1):
                 assert look.motion.given == beside.motion.given
 
 
-@pytest.mark.sample(20)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('drive', DRIVES)
 @pytest.mark.parametrize('effects', EFFECTS)
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
@@ -127,7 +127,7 @@ def test_compiled_tick_publishes_the_bytes_of_plain_steps(file, effects, drive):
     check(text, f'{DRIVES[drive]}\neffects: {EFFECTS[effects]}')
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     'file',
     [file for file in GALLERY if file.stem != 'gripper'],  # forces are not known with ratios
@@ -146,6 +146,7 @@ def test_compiled_tick_carries_an_estimated_acceleration(name):
     check(file.read_bytes(), f'{drive}\neffects: {{velocity: {{}}, acceleration: {{}}}}')
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('name', 'effects', 'loads'),
     [

@@ -215,6 +215,7 @@ def test_scene_with_one_effect_imports_no_other(tmp_path, bare, effect):
     assert 'numpy' not in look.modules
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('drive', DRIVE_SCENES)
 def test_scene_with_one_drive_imports_no_other(tmp_path, bare, drive):
     look = Look(tmp_path, f'drive: {{{DRIVE_SCENES[drive]}}}')

@@ -60,6 +60,7 @@ def test_equal_crank_messages_give_equal_bytes():
     assert first == second
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('wrap_input', [False, True])
 @pytest.mark.parametrize('direction', [1, -1])
 @pytest.mark.parametrize(

@@ -89,6 +89,7 @@ ANKLE = {
 PITCH, ROLL, ROLL_AT = (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, -0.018)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('motors', [(0.0, 0.0), (0.2, -0.1), (-0.35, 0.15), (0.3, 0.3)])
 @pytest.mark.parametrize('torques', [(1.0, 0.0), (2.0, -3.0), (-0.7, -0.9)])
 def test_two_motors_of_an_ankle_turn_it_by_the_forces_in_its_rods(motors, torques):

@@ -40,7 +40,7 @@ def off_by(found, wanted, name):
     return remainder(found - wanted, tau) if name.endswith('angle') else found - wanted
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('name', 'wanted'),
     [
@@ -85,6 +85,7 @@ def test_measured_input_gives_its_value_along_the_branch(name, wanted):
             assert off_by(*ends, wanted) == pytest.approx(2.0 * step, rel=1e-3)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ('name', 'wanted'),
     [
@@ -153,6 +154,7 @@ def test_driven_by_refuses_wrong_measures_in_one_line(name, wanted, line):
     assert '\n' not in str(error.value)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('side', ['left', 'right'])
 def test_coordinates_and_angles_drive_random_four_bars(side):
     rng = random.Random(side)

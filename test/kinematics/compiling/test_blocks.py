@@ -10,6 +10,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from math import inf, nan, nextafter, pi
 from pathlib import Path
 import random
@@ -99,6 +100,7 @@ STATES = sample_count(10_000, 3_000)
 """Of a linkage of the gallery; one that is iterated takes a hundred times as long for each."""
 
 
+@cache
 def closure_of(name: str) -> Closure:
     (path,) = (path for path in LINKAGES if path.stem == name)
     return Closure(read_linkage(read_yaml(path)[0]))

@@ -158,6 +158,7 @@ RANDOM = [(seed, dyads) for dyads in (1, 2, 3, 5, 8) for seed in range(25)]
 MANY = [(seed, 24) for seed in range(3)]
 
 
+@pytest.mark.sample(40)
 @pytest.mark.parametrize(('seed', 'dyads'), [*RANDOM, *MANY])
 def test_rough_points_of_each_dyad_select_the_drawn_assembly(seed, dyads):
     drawn = drawing(seed, dyads)
@@ -396,6 +397,7 @@ def off(one, other):
     return abs(remainder(one - other, tau))
 
 
+@pytest.mark.sample(40)
 @pytest.mark.parametrize('how', ['sides', 'pose', 'pose below', 'nominal'])
 @pytest.mark.parametrize('number', range(4))
 @pytest.mark.parametrize(('name', 'side'), ONCE)

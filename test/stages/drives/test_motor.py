@@ -16,7 +16,7 @@ The motor has k·N = 1, so a current of 1 A gives 1 N·m at the input without lo
 from dataclasses import replace
 from math import copysign, exp, log
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from linkage_ros.dynamics import AppliedLoads, JointLoad, Loads, Motor
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics import Closure
@@ -107,6 +107,7 @@ RUN_UPS = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name', RUN_UPS)
 def test_motor_runs_up_a_wheel_in_closed_form(name):
     motor, command, rate, known = RUN_UPS[name]
@@ -381,7 +382,6 @@ def positive(least, most):
     return st.floats(log(least), log(most)).map(exp)
 
 
-@settings(max_examples=200, deadline=None)
 @given(
     command=st.sampled_from(['effort', 'current', 'voltage']),
     value=st.floats(-100.0, 100.0),

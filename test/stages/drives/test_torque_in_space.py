@@ -53,6 +53,7 @@ def by_multipliers(closure, start, until, effort, loads):
     return found.y[:, -1]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['rssr', 'spatial_slider_crank', 'bennett'])
 def test_spatial_torque_drive_follows_lagrange_multipliers(name):
     closure = weighed(name)
@@ -125,6 +126,7 @@ def test_rssr_rests_on_a_soft_stop():
     assert 500.0 * (state.angles[0] - 0.5) == pytest.approx(2.0 - slope, rel=1e-9)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['rssr', 'spatial_slider_crank', 'hooke_joint'])
 def test_spatial_joint_friction_opposes_the_joint_rates(name):
     """Moments at hinges, a force at a slide: applied in absolute coordinates, by the signs."""

@@ -118,7 +118,7 @@ def run(name, numbers, milliseconds=250):
     return found
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', SCENES)
 def test_uncoupled_inputs_move_as_each_alone(name):
     both = run(name, (1, 2))

@@ -38,7 +38,7 @@ def by_exponential(t, voltage, inductance, inertia=INERTIA, rate=0.0):
     return value, rate, current
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('inductance', [LARGE, HUGE])
 @pytest.mark.parametrize(
     ('motor', 'command', 'voltage', 'rate'),

@@ -125,6 +125,7 @@ def test_recoverable_effects_converge_after_a_late_start(effect):
     assert follow(0) == follow(333) or not given.is_recoverable
 
 
+@pytest.mark.sample(50)
 @pytest.mark.parametrize('effects', [*combinations(EFFECTS, 2)], ids='-'.join)
 def test_effects_work_in_pairs(effects):
     assert any(message for message, *_ in run(scene_text(*effects), 5))

@@ -29,6 +29,7 @@ def shift(within, motion, pins):
     return moved(within, motion, {'pin_forces': (), 'clearance': (pins,)}).deflection
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(
     'plays',
     [(0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (1, 0, 0, 0), (0.5, 1, 0.25, 0.75)],

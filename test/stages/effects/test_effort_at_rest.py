@@ -142,6 +142,7 @@ def rested(state, command, ms=1000):
 CASES = [(name, command) for name, state in STATES.items() for command in state.commands]
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize(('name', 'command'), CASES)
 def test_effort_at_rest_equals_the_command(name, command):
     state = STATES[name]
@@ -164,6 +165,7 @@ def test_effort_at_rest_equals_the_command(name, command):
         assert behind_gear == pytest.approx((least, most), abs=1e-9)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('command', [0.5, 5.0])
 @pytest.mark.parametrize('damping', [2.0, 5.0])
 def test_effort_on_a_soft_stop_equals_the_command(command, damping):

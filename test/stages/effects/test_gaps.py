@@ -84,6 +84,7 @@ def test_delay_publishes_only_readings_with_a_pose(seconds, late, between, veloc
             assert open_by(crank_at(one.stamp), one.joints) < (1e-14 if exact else 5e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('distribution', ['uniform', 'half_normal'])
 def test_jitter_publishes_no_reading_from_a_gap(distribution):
     found = run(f'jitter: {{seconds: 0.004, distribution: {distribution}}}')

@@ -102,6 +102,7 @@ def some_inputs(closure):
 # Positions.
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('linkage', GALLERY)
 def test_link_markers_equal_the_drawing_of_the_pose(linkage):
     held = Held(linkage)
@@ -137,6 +138,7 @@ ALL_RAILS = {'elliptic_trammel', 'inverted_slider_crank', 'scotch_yoke'}
 """Linkages of which every link carries a rail, or is one link."""
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('linkage', GALLERY)
 def test_pin_and_block_markers_lie_at_their_points(linkage):
     held = Held(linkage)

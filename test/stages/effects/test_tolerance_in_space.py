@@ -60,6 +60,7 @@ def test_an_rssr_of_parts_that_deviate_moves_by_their_own_lengths():
         assert abs(expected - near) > 1e-4
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', ['ankle', 'ankle_motors', 'delta', 'hexapod', 'wishbone'])
 def test_each_part_has_its_own_dimensions_and_the_inputs_are_those_of_the_pose(name):
     drawn = load(name).linkage

@@ -9,6 +9,7 @@
 """The balls hold the truth: by power series of dyads, and by their own differences."""
 
 from dataclasses import fields
+from functools import cache
 from math import pi
 from typing import Any
 
@@ -43,6 +44,7 @@ from ...kinematics.samples import (
 IN_SPACE = ['rssr', 'spatial_slider_crank', 'delta', 'ankle', 'ankle_motors', 'wishbone']
 
 
+@cache
 def closure_of(name: str) -> Closure:
     return load(name)
 
