@@ -9,6 +9,7 @@
 """Shipped files, damaged or changed at random: they run, or one line says why not."""
 
 from copy import deepcopy
+from functools import cache
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,10 @@ from ..support.sampling import sample_count
 # The shipped files, damaged at random: each still runs, or is refused in one line.
 
 
-SHIPPED = [load_scene(scene).files for scene in sorted((CONFIG / 'scenes').glob('*.yaml'))]
+@cache
+def shipped() -> list[dict[str, bytes]]:
+    """Return the files of all shipped scenes."""
+    return [load_scene(scene).files for scene in sorted((CONFIG / 'scenes').glob('*.yaml'))]
 
 
 def either_runs_or_says_why(files: dict[str, bytes]) -> None:
@@ -47,8 +51,8 @@ def either_runs_or_says_why(files: dict[str, bytes]) -> None:
 
 @given(data=st.data())
 def test_scene_with_damaged_bytes_runs_or_is_refused(data):
-    shipped = data.draw(st.sampled_from(SHIPPED))
-    files = {name: bytearray(file) for name, file in shipped.items()}
+    scene = data.draw(st.sampled_from(shipped()))
+    files = {name: bytearray(file) for name, file in scene.items()}
     damaged = files[data.draw(st.sampled_from(sorted(files)))]
     for _ in range(data.draw(st.integers(1, 4))):
         place = data.draw(st.integers(0, len(damaged) - 1))
@@ -81,8 +85,8 @@ def places(content, path=()):
 
 @given(data=st.data())
 def test_scene_with_damaged_keys_runs_or_is_refused(data):
-    shipped = data.draw(st.sampled_from(SHIPPED))
-    files = {name: yaml.safe_load(file) for name, file in shipped.items()}
+    scene = data.draw(st.sampled_from(shipped()))
+    files = {name: yaml.safe_load(file) for name, file in scene.items()}
     damaged = files[data.draw(st.sampled_from(sorted(files)))]
     for _ in range(data.draw(st.integers(1, 3))):
         *path, key = data.draw(st.sampled_from(sorted(places(damaged), key=str) or [('x',)]))

@@ -28,7 +28,7 @@ from campaigns.inverse import (
     random_slides,
 )
 from flint import arb
-from linkage_ros import Closure, DefinitionError, Limits, linkage_names, load
+from linkage_ros import Closure, DefinitionError, Limits, load
 from linkage_ros.kinematics import (
     CODES,
     CrankBranch,
@@ -49,6 +49,7 @@ import pytest
 
 from ..linkages import four_bar_linkage
 from ...support.sampling import sample_count
+from ...support.scenes import ONE_INPUT
 
 U = 2.0**-53
 STATES = int(os.environ.get('LINKAGE_STATES') or sample_count(100, 30))
@@ -56,11 +57,7 @@ STATES = int(os.environ.get('LINKAGE_STATES') or sample_count(100, 30))
 
 FREE = Limits()
 
-LINKAGES = [
-    name
-    for name in linkage_names()
-    if len(load(name).input_names) == 1 and name not in ('class_3', 'parallelogram')
-]
+LINKAGES = [name for name in ONE_INPUT if name not in ('class_3', 'parallelogram')]
 
 
 @cache
