@@ -103,8 +103,8 @@ class NoiseEffect(SensorEffect):
         """
         Build the sensor.
 
-        Raise `DefinitionError` if kinds of noise of a joint exclude or lack each other, or a density
-        has no rate.
+        Raise `DefinitionError` if kinds of noise of a joint exclude or lack each other, or a
+        density has no rate.
         """
         for joint, noise in self.joints.items():
             _check_noise(f'effects.noise.joints.{joint}', noise, context.rate)
