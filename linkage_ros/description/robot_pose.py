@@ -313,8 +313,10 @@ class RobotPose:
             start = self.move(values, nudges, ratios)
             met, gap = self.meet(start, moved, ratios, is_far=True, within_limits=within_limits)
             for name in moved:
-                if self._tree.joints[name].kind != 'prismatic' and not within_limits:
-                    met[name] = remainder(met[name], tau)
+                if self._tree.joints[name].kind != 'prismatic':
+                    angle = remainder(met[name], tau)
+                    if not within_limits or self._bring_within(name, angle) == angle:
+                        met[name] = angle
             if gap < _CLOSED * self.size and (self.is_within_limits(met) or not within_limits):
                 return met
         return None

@@ -13,7 +13,8 @@ that carry nothing else. A rod between two balls may turn about itself, and noth
 that turn; its parts may slide in each other. So may a link between two hinges on one line, or
 between a hinge and a ball on its line. One hinge of each keeps its value. Of a ball it is the one
 whose axis is most along the rod, if the other two lie across each other, since these then point
-the rod nearly everywhere. The plan has the links at that hinge as one, and rods on balls.
+the rod nearly everywhere. Where several would do, names decide, and not the order of a file. The
+plan has the links at that hinge as one, and rods on balls.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ from linkage_ros.names import free_name
 _INDEPENDENT = 0.1
 """Least volume that the axes of a ball span in the pose: 1 if they are at right angles."""
 
+_ALIKE = 1e-6
+"""Difference in fitness of two hinges that their file's rounding may make."""
 
 _OF_BALL = 3
 """Hinges of a ball."""
@@ -135,7 +138,7 @@ def _as_one(linkage: SpaceLinkage, name: str, gone: str, kept: str) -> SpaceLink
 def _rods(linkage: SpaceLinkage, reach: float) -> Iterator[list[_IdleEnd]]:
     """Yield the ends of links that two of them hold and nothing else, and not only balls."""
     joints = defaultdict[str, list[str]](list)
-    for name, joint in linkage.pair_joints.items():
+    for name, joint in sorted(linkage.pair_joints.items()):
         joints[joint.parent].append(name)
         joints[joint.child].append(name)
     carriers = defaultdict[str, list[str]](list)
@@ -144,7 +147,7 @@ def _rods(linkage: SpaceLinkage, reach: float) -> Iterator[list[_IdleEnd]]:
             carriers[point].append(link)
     moved = {point for ends in linkage.struts.values() for point in ends}
     seen = {GROUND}
-    for first in linkage.link_names:
+    for first in sorted(linkage.link_names):
         ends, parts = list[_IdleEnd | None](), [first]
         for link in parts:
             for point in linkage.links.get(link, ()):
@@ -162,7 +165,9 @@ def _rods(linkage: SpaceLinkage, reach: float) -> Iterator[list[_IdleEnd]]:
         found = [end for end in ends if end is not None]
         is_held = len(found) == len(ends) == 2 and any(end.hinges for end in found)
         if is_held and seen.isdisjoint(parts):
-            yield sorted(found, key=lambda end: (1, _OF_BALL, 0).index(len(end.hinges)))
+            yield sorted(
+                found, key=lambda end: ((1, _OF_BALL, 0).index(len(end.hinges)), end.hinges)
+            )
         seen |= {*parts} - {GROUND}
 
 
@@ -241,4 +246,5 @@ def _hinge_to_hold(linkage: SpaceLinkage, balls: list[_IdleEnd]) -> str:
         for name, axis in axes.items():
             others = (other for of, other in axes.items() if of != name)
             fitness[name] = abs(dot(axis, rod)) * length(cross(*others))
-    return max(fitness, key=fitness.__getitem__, default='')
+    best = max(fitness.values(), default=0.0)
+    return min((name for name, fit in fitness.items() if fit > best - _ALIKE), default='')

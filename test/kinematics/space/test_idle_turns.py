@@ -75,6 +75,38 @@ def test_three_hinge_balls_give_the_states_of_balls(name, both, seed):
         assert all(values[each] == 0.0 for each in closure.held)
 
 
+def in_random_order(linkage, rng):
+    """Return the linkage with its hinges and links in another order."""
+    hinges, links = (rng.permutation([*part]) for part in (linkage.hinges, linkage.links))
+    return replace(
+        linkage,
+        hinges={str(name): linkage.hinges[name] for name in hinges},
+        links={str(name): linkage.links[name] for name in links},
+    )
+
+
+@pytest.mark.parametrize('name', WITH_RODS)
+@pytest.mark.parametrize('seed', range(3))
+def test_order_of_a_file_does_not_choose_what_is_held(name, seed):
+    """Any of the hinges of a ball along a rod, or at a ring, could keep its value."""
+    rng = np.random.default_rng(seed)
+    drawn = load(name)
+    linkage = drawn.linkage
+    for rod in drawn.idle:
+        for point in linkage.links[rod]:
+            linkage = written_as_hinges(linkage, rod, point, rng)
+    for hinge in drawn.linkage.hinges:
+        if hinge not in linkage.driven:
+            linkage = with_ring(linkage, hinge, rng)
+    linkage = replace(linkage, published=(*linkage.hinges.keys() - {*linkage.driven},))
+    first, *others = (SpaceClosure(in_random_order(linkage, rng)) for _ in range(3))
+    for other in others:
+        assert {*other.held} == {*first.held}
+        for inputs in first.linkage.pose.inputs + rng.uniform(-0.1, 0.1, (5, len(linkage.driven))):
+            found = other.position(*inputs).joints
+            assert found == pytest.approx(first.position(*inputs).joints, abs=1e-8)
+
+
 def test_robot_with_hinge_balls_closes_its_urdf_tree():
     """The values of pitch and roll are of own Newton; the tree is walked by yourdfpy."""
     closure = load(ROBOT, {'input': ['m1', 'm2']})

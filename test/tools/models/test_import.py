@@ -279,6 +279,15 @@ def test_pose_near_leaves_out_limits_that_exclude_it():
         robot_of(robot(limited, LOOP_CONSTRAINT), input='crank_joint', at=told)
 
 
+def test_pose_near_has_no_whole_turns(monkeypatch):
+    """The search begins many turns away, as it does when it has not found a nearer pose."""
+    monkeypatch.setattr('linkage_ros.description.robot_pose._NUDGES', (40.0,))
+    free = TREE.replace('lower="-3" upper="3"', 'lower="-100" upper="100"')
+    told = {'input': 'crank_joint', 'at': {'crank_joint': 0.5}, 'near': True}
+    closure = robot_of(robot(free, LOOP_CONSTRAINT), **told)
+    assert max(map(abs, closure.position(*closure.linkage.pose.inputs).joints)) <= pi
+
+
 UNREAD = {
     SDF_JOINT.replace(
         '<pose>', '<pose relative_to="base">'
