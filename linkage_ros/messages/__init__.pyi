@@ -17,13 +17,10 @@ from linkage_ros.messages.input_samples import (
 from linkage_ros.messages.joint_state import (
     arrays_of as arrays_of,
     CrankSample as CrankSample,
-    effort_reader as effort_reader,
     EffortCommand as EffortCommand,
-    EffortsCommand as EffortsCommand,
     head_of as head_of,
     JOINT_STATE as JOINT_STATE,
     JointEffortReader as JointEffortReader,
-    JointEffortsReader as JointEffortsReader,
     JointStateReader as JointStateReader,
     JointStateWriter as JointStateWriter,
     OwnJointStates as OwnJointStates,

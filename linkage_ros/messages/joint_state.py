@@ -16,7 +16,7 @@ gets the same bytes. Encoding: CDR version 1 (encapsulation 00 00 or 00 01) of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from enum import Enum
 from struct import Struct
 from typing import Any, NamedTuple
@@ -274,19 +274,7 @@ def with_every_number(data: bytes, value: float) -> bytes:
 
 
 class EffortCommand(NamedTuple):
-    """A command for one joint."""
-
-    stamp: int  # Stamp of the message, in [ns]; 0 without one
-    effort: float  # Effort in [N·m]; of a sliding joint in [N]
-
-    @property
-    def efforts(self) -> tuple[float]:
-        """Return it as one of several joints."""
-        return (self.effort,)
-
-
-class EffortsCommand(NamedTuple):
-    """Commands for several joints."""
+    """Commands for the joints of a reader."""
 
     stamp: int  # Stamp of the message, in [ns]; 0 without one
     # Effort of each joint in [N·m], of a sliding one in [N]; None for a joint without a command.
@@ -295,43 +283,15 @@ class EffortsCommand(NamedTuple):
 
 class JointEffortReader:
     """
-    Reads the effort of a joint, at any place in a message, from serialized messages.
+    Reads the efforts of some joints, at any places in a message, from serialized messages.
 
-    Controllers fill name and effort; positions and velocities may be present, and are ignored. So
-    is the stamp: a command holds from its arrival. The topic-based hardware of ros2_control
+    A message names one of the joints or more: the others have no command in it. Controllers fill
+    name and effort; positions and velocities may be present, and are ignored. So is the stamp: a
+    command holds from its arrival. The topic-based hardware of ros2_control
     (joint_state_topic_hardware_interface 1.1.0) names all joints of a system, but gives efforts
     only for those that have a command, without saying which; a joint that depends on others has
     none. So a message may name the ``dependent`` joints, which cannot be commanded, without an
     effort.
-    """
-
-    __slots__ = ('_dependent', '_joint', '_known')
-
-    def __init__(self, joint: str, dependent: Collection[str] = ()) -> None:
-        self._joint = joint.encode()
-        self._dependent = frozenset(name.encode() for name in dependent)
-        self._known: tuple[int, Callable[[bytes], tuple[Any, ...]], tuple[Any, ...]] | None = None
-
-    def read(self, data: bytes) -> EffortCommand | Rejection:
-        """Return the command for the joint, or the reason for its rejection."""
-        if self._known is not None:
-            size, unpack_from, fixed = self._known
-            if len(data) >= size:
-                order, seconds, nanoseconds, names, rates, efforts, effort = unpack_from(data)
-                if (order, names, rates, efforts) == fixed:
-                    return EffortCommand(seconds * NANOSECONDS + nanoseconds, effort)
-        layout = _effort_pattern(data, [self._joint], self._dependent)
-        if isinstance(layout, Rejection):
-            return layout
-        self._known = layout.size, layout.unpack_from, layout.fixed
-        return self.read(data)
-
-
-class JointEffortsReader:
-    """
-    Reads the efforts of several joints from serialized messages, as `JointEffortReader` of one.
-
-    A message names one of them or more: the others have no command in it.
     """
 
     __slots__ = ('_dependent', '_joints', '_known')
@@ -339,54 +299,39 @@ class JointEffortsReader:
     def __init__(self, joints: Sequence[str], dependent: Collection[str] = ()) -> None:
         self._joints = [joint.encode() for joint in joints]
         self._dependent = frozenset(name.encode() for name in dependent)
-        self._known: tuple[Pattern, list[int]] | None = None
+        self._known: tuple[Pattern, list[bool]] | None = None
 
-    def read(self, data: bytes) -> EffortsCommand | Rejection:
+    def read(self, data: bytes) -> EffortCommand | Rejection:
         """Return the commands for the joints, or the reason for the rejection of the message."""
         if self._known is not None:
-            pattern, numbers = self._known
-            if len(data) >= pattern.size:
-                values = pattern.unpack_from(data)
-                if pattern.pick_fixed(values) == pattern.fixed:
-                    efforts: list[float | None] = [None] * len(self._joints)
-                    (pick,) = pattern.picks
-                    for number, effort in zip(numbers, pick(values), strict=True):
-                        efforts[number] = effort
-                    stamp = values[1] * NANOSECONDS + values[2]
-                    return EffortsCommand(stamp, tuple(efforts))
-        arrays_or_reason = arrays_of(data)
-        if isinstance(arrays_or_reason, Rejection):
-            return arrays_or_reason
-        names = arrays_or_reason[1]
-        # First, whether it is for this reader at all: others may share the topic.
-        named = [joint for joint in self._joints if joint in names]
-        if names and not named:
-            return Rejection.MISSING
-        layout = _effort_pattern(data, named, self._dependent)
+            (size, unpack_from, pick_fixed, fixed, (pick,)), named = self._known
+            if len(data) >= size:
+                values = unpack_from(data)
+                if pick_fixed(values) == fixed:
+                    efforts = pick(values)
+                    if len(efforts) < len(named):
+                        left = iter(efforts)
+                        efforts = tuple([next(left) if one else None for one in named])
+                    return EffortCommand(values[1] * NANOSECONDS + values[2], efforts)
+        layout = _effort_pattern(data, self._joints, self._dependent)
         if isinstance(layout, Rejection):
             return layout
-        self._known = layout, [self._joints.index(joint) for joint in named]
+        self._known = layout
         return self.read(data)
-
-
-def effort_reader(
-    joints: Sequence[str], dependent: Collection[str] = ()
-) -> Callable[[bytes], EffortCommand | EffortsCommand | Rejection]:
-    """Return a function that reads commands of efforts for one joint, or for several."""
-    if len(joints) == 1:
-        return JointEffortReader(joints[0], dependent).read
-    return JointEffortsReader(joints, dependent).read
 
 
 def _effort_pattern(
     data: bytes, joints: Sequence[bytes], dependent: Collection[bytes]
-) -> Pattern | Rejection:
+) -> tuple[Pattern, list[bool]] | Rejection:
+    """Return the layout of a message, and which of the joints it names."""
     arrays_or_reason = arrays_of(data)
     if isinstance(arrays_or_reason, Rejection):
         return arrays_or_reason
     _, names, arrays = arrays_or_reason
     efforts = arrays[-1]
-    if names and not {*joints} <= {*names}:
+    named = [joint in names for joint in joints]
+    # First, whether it is for this reader at all: others may share the topic.
+    if names and not any(named):
         return Rejection.MISSING
     if not efforts.length:
         return Rejection.NO_EFFORT
@@ -398,5 +343,5 @@ def _effort_pattern(
     if any(names.count(joint) > 1 for joint in joints):
         return Rejection.TWICE
     commanded = names if efforts.length == len(names) else able
-    places = [efforts.first + 8 * commanded.index(joint) for joint in joints]
-    return compile_pattern(data, arrays, [places])
+    places = [efforts.first + 8 * commanded.index(joint) for joint in joints if joint in names]
+    return compile_pattern(data, arrays, [places]), named

@@ -43,10 +43,10 @@ from linkage_ros.bag import (
 from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import BagError, did_you_mean, LinkageError, list_names
 from linkage_ros.messages import (
-    effort_reader,
     head_of,
     input_reader,
     JOINT_STATE_TYPE,
+    JointEffortReader,
     Rejection,
     text_message,
     TIME_END,
@@ -435,7 +435,7 @@ def _sample_reader(
     scene_linkage: SceneLinkage, dependent: Collection[str]
 ) -> Callable[[bytes], object]:
     if scene_linkage.drive[1].gives_torque:
-        return effort_reader(scene_linkage.input_names, dependent)
+        return JointEffortReader(scene_linkage.input_names, dependent).read
     return input_reader(scene_linkage.sampled_joints)
 
 

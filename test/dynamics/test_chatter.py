@@ -158,7 +158,7 @@ def pushed(drive, every, until=1500):
     for time in range(until + 1):
         now = BEGIN + time * MS
         if not time % 10:
-            assert drive.offer(EffortCommand(0, 5.0), now) is None
+            assert drive.offer(EffortCommand(0, (5.0,)), now) is None
         if not time % every:
             state = drive.state(now)
     return state, drive.chatter_count
@@ -183,7 +183,7 @@ def test_late_ticks_skip_time_while_the_play_chatters():
     lost = []
     for index in range(40):
         now = BEGIN + 100 * index * MS
-        assert drive.offer(EffortCommand(0, 5.0), now) is None
+        assert drive.offer(EffortCommand(0, (5.0,)), now) is None
         drive.state(now)
         lost.append(drive.lost)
     assert drive.chatter_count > 0
@@ -196,6 +196,6 @@ def test_finite_bounces_do_not_count_as_chatter():
     drive = drive_of(f'{LIGHT}, on_chatter: end')
     for index in range(100):
         if not index % 10:
-            drive.offer(EffortCommand(0, 0.02 * (-1) ** (index // 10)), BEGIN + index * 10 * MS)
+            drive.offer(EffortCommand(0, (0.02 * (-1) ** (index // 10),)), BEGIN + index * 10 * MS)
         drive.state(BEGIN + index * 10 * MS)
     assert drive.chatter_count == 0

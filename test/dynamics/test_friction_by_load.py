@@ -315,7 +315,7 @@ def test_jammed_slider_crank_stands_under_any_command():
         context = Context(closure, 1000.0, True, 'seed', loads, friction)
         drive = TorqueDrive(start=0.9, rate=-0.1).build(context)
         drive.state(BEGIN)
-        drive.offer(EffortCommand(0, -300.0), BEGIN)
+        drive.offer(EffortCommand(0, (-300.0,)), BEGIN)
         state = drive.state(BEGIN + 5_000_000)
         assert (state.rates == (0.0,)) == stands
         assert (state.angles[0] < 0.89) != stands

@@ -193,7 +193,7 @@ def test_recommended_step_reproduces_stribeck_friction(method, rate):
     linkage.drive.state(BEGIN)
     for index in range(20):
         now = BEGIN + 10_000_000 * index
-        assert linkage.drive.offer(EffortCommand(0, pushed(index)), now) is None
+        assert linkage.drive.offer(EffortCommand(0, (pushed(index),)), now) is None
     found = linkage.drive.state(BEGIN + 200_000_000).angles[0]
     expected = rubbed_by_scipy(rate, 20)
     assert abs(expected - 1.0) > 0.5, 'it moves'

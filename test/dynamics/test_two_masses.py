@@ -303,7 +303,7 @@ def read(drive, commands=(), ticks=200, loads=''):
         now = BEGIN + 2_000_000 * index
         for tick, effort in commands:
             if tick == index:
-                assert linkage.drive.offer(EffortCommand(0, effort), now) is None
+                assert linkage.drive.offer(EffortCommand(0, (effort,)), now) is None
         reading = linkage.interpret(now).reading
         found.append((*linkage.drive.motor[:2], reading.joints[0], reading.rates[0]))
     return found

@@ -92,9 +92,9 @@ def test_reader_reads_joint_states_written_by_rosbags(messages):
 
 @given(st.lists(joint_states(required='efforts'), min_size=1, max_size=4))
 def test_reader_reads_the_effort_of_its_joint(messages):
-    reader = JointEffortReader(CRANK)  # one for all: layouts change from message to message
+    reader = JointEffortReader([CRANK])  # one for all: layouts change from message to message
     for message in messages:
-        stamp, effort = reader.read(serialized(**message))
+        stamp, (effort,) = reader.read(serialized(**message))
         assert stamp == message['stamp'][0] * NS + message['stamp'][1]
         assert same(effort, message['efforts'][message['names'].index(CRANK)])
 
@@ -152,9 +152,9 @@ READERS = {
         CrankSample(NS + 2, (0.5,), (1.0,)),
     ),
     'effort command': Reader(
-        lambda: JointEffortReader(CRANK),
+        lambda: JointEffortReader([CRANK]),
         serialized(['a', CRANK], [0.1, 0.2], efforts=[1.0, 4.0], frame='base'),
-        EffortCommand(NS + 2, 4.0),
+        EffortCommand(NS + 2, (4.0,)),
     ),
 }
 every_reader = pytest.mark.parametrize('name', READERS)
@@ -282,15 +282,15 @@ DEPENDENT = ('coupler_joint', 'rocker_joint')
 )
 @pytest.mark.parametrize('little', [True, False])
 def test_dependent_joints_need_no_effort(names, efforts, expected, little):
-    reader = JointEffortReader(CRANK, DEPENDENT)
+    reader = JointEffortReader([CRANK], DEPENDENT)
     for _ in range(2):  # also with a layout known
         read = reader.read(serialized(names, efforts=efforts, little=little))
-        assert read == (EffortCommand(NS + 2, 4.0) if expected == 4.0 else expected)
+        assert read == (EffortCommand(NS + 2, (4.0,)) if expected == 4.0 else expected)
 
 
 def test_command_with_stamp_zero_is_accepted():
     data = serialized([CRANK], efforts=[4.0], stamp=(0, 0))
-    assert JointEffortReader(CRANK).read(data) == EffortCommand(0, 4.0)
+    assert JointEffortReader([CRANK]).read(data) == EffortCommand(0, (4.0,))
 
 
 @every_reader

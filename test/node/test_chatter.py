@@ -35,7 +35,7 @@ def run(loop, begin, end):
     """Tick a loop from one [ms] to another under 5 N·m."""
     (linkage,) = loop.pipeline.linkages
     for time_ms in range(begin, end, 10):
-        assert linkage.drive.offer(EffortCommand(0, 5.0), BEGIN + time_ms * 1_000_000) is None
+        assert linkage.drive.offer(EffortCommand(0, (5.0,)), BEGIN + time_ms * 1_000_000) is None
         loop.tick_at(BEGIN + time_ms * 1_000_000)
 
 

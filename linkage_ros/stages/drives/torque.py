@@ -28,7 +28,7 @@ from linkage_ros.description import choice, each_part, number, optional_section,
 from linkage_ros.dynamics import LARGEST, METHODS, SingleDofMechanism
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, describe_ranges
-from linkage_ros.messages import effort_reader, JOINT_STATE_TYPE, NANOSECONDS
+from linkage_ros.messages import JOINT_STATE_TYPE, JointEffortReader, NANOSECONDS
 from linkage_ros.stages.drives.drive import Context, Drive, Reader
 from linkage_ros.stages.drives.torque_crank import TorqueCrank
 
@@ -217,7 +217,7 @@ class TorqueDrive(Drive):
 
     def reader(self, context: Context) -> Reader:
         """Build the reader of the messages."""
-        return effort_reader(context.inputs_in_messages, context.dependent)
+        return JointEffortReader(context.inputs_in_messages, context.dependent).read
 
     def writer(self, context: Context, drive: TorqueCrank) -> Any:
         """Build the writer of ~/motor; None if the motor is not published."""

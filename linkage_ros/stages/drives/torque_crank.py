@@ -25,7 +25,7 @@ from typing import Any, TYPE_CHECKING
 
 from linkage_ros.dynamics import LARGEST, Motion
 from linkage_ros.errors import LinkageError
-from linkage_ros.messages import EffortCommand, EffortsCommand, NANOSECONDS, Rejection
+from linkage_ros.messages import EffortCommand, NANOSECONDS, Rejection
 from linkage_ros.stages.drives.drive import Crank, CrankAtRest, CrankState
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ class TorqueCrank(Crank):
         """Numbers of the inputs that the last good message commands."""
         return self._newest_inputs
 
-    def offer(self, command: EffortCommand | EffortsCommand, now: int) -> Rejection | None:
+    def offer(self, command: EffortCommand, now: int) -> Rejection | None:
         """Take commands at a time [ns], or return why they are rejected; then nothing changes."""
         named = [(n, effort) for n, effort in enumerate(command.efforts) if effort is not None]
         for _, effort in named:

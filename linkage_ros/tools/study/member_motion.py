@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 from linkage_ros.description import SceneLinkage
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure, Linkage, RevoluteJoint, SpaceLinkage
-from linkage_ros.messages import EffortsCommand, NANOSECONDS
+from linkage_ros.messages import EffortCommand, NANOSECONDS
 from linkage_ros.stages.drives import Context, CrankState, TorqueCrank, TorqueDrive
 from linkage_ros.tools.study.budget import JointError
 import numpy as np
@@ -90,7 +90,7 @@ def cranks_at(motion: LinkageMotion, times: Sequence[int], **changes: Any) -> li
         for stop in (*range(passed - passed % look + look, time, look), time):
             while number < len(commands) and commands[number].time <= stop:
                 arrival, efforts = commands[number]
-                drive.offer(EffortsCommand(0, efforts), BEGIN + arrival)
+                drive.offer(EffortCommand(0, efforts), BEGIN + arrival)
                 number += 1
             crank = drive.state(BEGIN + stop)
             _check_bounded(crank, stop, step)

@@ -135,7 +135,7 @@ def pushed(limits, effort, rocker='', seconds=3.0, start=1.0, **more):
     )
     (line,) = built.linkages
     line.drive.state(BEGIN)
-    assert line.drive.offer(EffortCommand(0, effort), BEGIN) is None
+    assert line.drive.offer(EffortCommand(0, (effort,)), BEGIN) is None
     (value,) = line.drive.state(BEGIN + round(seconds * 1000) * MS).angles
     return line, value
 

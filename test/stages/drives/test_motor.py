@@ -54,7 +54,7 @@ def drive(motor, closure=WHEEL, loads=None, **parameters):
 def under(built, command, milliseconds=2000, every=50):
     """Yield time, value, rate and acceleration under one command from the first tick on."""
     built.state(BEGIN)
-    assert built.offer(EffortCommand(0, command), BEGIN) is None
+    assert built.offer(EffortCommand(0, (command,)), BEGIN) is None
     for at in range(0, milliseconds + 1, every):
         state = built.state(BEGIN + at * MS)
         yield at * 1e-3, *state.angles, *state.rates, *state.accelerations
@@ -248,7 +248,7 @@ def test_motor_commands_follow_delay_and_timeout(name):
     for at, current, acceleration in timeline:
         now = BEGIN + at * MS
         if acceleration is None:
-            assert built.offer(EffortCommand(0, current), now) is None
+            assert built.offer(EffortCommand(0, (current,)), now) is None
         else:
             found = built.state(now).accelerations[0]
             assert found == pytest.approx(acceleration, rel=1e-9, abs=1e-12), at
@@ -257,7 +257,7 @@ def test_motor_commands_follow_delay_and_timeout(name):
 def test_motor_delay_is_exact_to_the_nanosecond():
     built = drive({'command': 'current', 'delay': 0.000_700_001}, timeout=0.1)
     built.state(BEGIN)
-    built.offer(EffortCommand(0, 1.0), BEGIN)
+    built.offer(EffortCommand(0, (1.0,)), BEGIN)
     assert built.state(BEGIN + 700_000).accelerations == (0.0,)
     assert built.state(BEGIN + 700_001).accelerations[0] == pytest.approx(2.0)
     later = 0.1 - 0.000_700_001

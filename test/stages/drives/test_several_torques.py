@@ -21,7 +21,7 @@ from linkage_ros.dynamics import (
 )
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics import Limits
-from linkage_ros.messages import EffortsCommand, JointEffortsReader, Rejection
+from linkage_ros.messages import EffortCommand, JointEffortReader, Rejection
 from linkage_ros.stages.drives import Context, TorqueDrive
 from linkage_ros.stages.drives.torque import MotorParameters, PlayParameters, TorqueInput
 import pytest
@@ -62,8 +62,8 @@ def stepped(closure, loads, start, forces):
 def test_torque_commands_time_out_separately():
     crank = five_bar(timeout=0.03)
     crank.state(BEGIN)
-    assert crank.offer(EffortsCommand(0, (0.4, None)), BEGIN) is None
-    assert crank.offer(EffortsCommand(0, (None, -0.2)), BEGIN + 10 * MS) is None
+    assert crank.offer(EffortCommand(0, (0.4, None)), BEGIN) is None
+    assert crank.offer(EffortCommand(0, (None, -0.2)), BEGIN + 10 * MS) is None
     state = crank.state(BEGIN + 50 * MS)
     # The first for 30 ms; the second from 10 ms on, for as long.
     forces = [[0.4, 0.0]] * 10 + [[0.4, -0.2]] * 20 + [[0.0, -0.2]] * 10 + [[0.0, 0.0]] * 10
@@ -75,7 +75,7 @@ def test_torque_motion_does_not_depend_on_query_times():
     often, once = five_bar(), five_bar()
     for crank in (often, once):
         crank.state(BEGIN)
-        crank.offer(EffortsCommand(0, (0.1, -0.1)), BEGIN + 333_333)
+        crank.offer(EffortCommand(0, (0.1, -0.1)), BEGIN + 333_333)
     for time in range(1, 60_000_000, 770_000):
         often.state(BEGIN + time)
     assert often.state(BEGIN + 60 * MS) == once.state(BEGIN + 60 * MS)
@@ -87,7 +87,7 @@ def test_a_command_that_is_no_number_changes_nothing():
     other.state(BEGIN)
     bad = {nan: Rejection.EFFORT_NOT_FINITE, 1e11: Rejection.EFFORT_TOO_LARGE}
     for effort, reason in bad.items():
-        assert crank.offer(EffortsCommand(0, (1.0, effort)), BEGIN) is reason
+        assert crank.offer(EffortCommand(0, (1.0, effort)), BEGIN) is reason
     assert crank.state(BEGIN + 20 * MS) == other.state(BEGIN + 20 * MS)
 
 
@@ -97,7 +97,7 @@ def test_two_motors_follow_their_voltages():
     inputs = {name: replace(given, motor=motor) for name, given in START.items()}
     crank = five_bar(('effort',), inputs=inputs)
     crank.state(BEGIN)
-    crank.offer(EffortsCommand(0, (3.0, -1.0)), BEGIN)
+    crank.offer(EffortCommand(0, (3.0, -1.0)), BEGIN)
     state = crank.state(BEGIN + 40 * MS)
     for number, voltage in enumerate((3.0, -1.0)):
         torque = (voltage - 1.0 * state.rates[number]) / 2.0
@@ -112,7 +112,7 @@ def test_two_motors_follow_their_voltages():
 
 
 def test_commands_arrive_jointly_or_per_motor():
-    reader = JointEffortsReader(['a', 'b', 'c'], {'d'})
+    reader = JointEffortReader(['a', 'b', 'c'], {'d'})
     assert reader.read(serialized(['c', 'a'], efforts=[1.0, 2.0])).efforts == (2.0, None, 1.0)
     assert reader.read(serialized(['b'], efforts=[3.0])).efforts == (None, 3.0, None)
     assert reader.read(serialized(['b'], efforts=[4.0])).efforts == (None, 4.0, None)
@@ -250,7 +250,7 @@ def test_too_many_impacts_in_the_play_are_reported():
         play = PlayParameters(1e-6, 1e-3, 1.0, on_chatter)
         crank = five_bar(play=play)
         crank.state(BEGIN)
-        crank.offer(EffortsCommand(0, (3.0, 3.0)), BEGIN)
+        crank.offer(EffortCommand(0, (3.0, 3.0)), BEGIN)
         crank.state(BEGIN + 3 * MS)
         return crank.chatter_count
 
@@ -269,7 +269,7 @@ def test_dependent_joint_limit_stops_the_torque_drive():
     crank.state(BEGIN)
     pitch = limited.joint_names.index('pitch')
     for time in range(1, 60):
-        crank.offer(EffortsCommand(0, (3.0, 3.0)), BEGIN + 10 * time * MS)
+        crank.offer(EffortCommand(0, (3.0, 3.0)), BEGIN + 10 * time * MS)
         state = crank.state(BEGIN + 10 * time * MS)
         value = limited.close_unlimited(*state.angles).joints[pitch]
         assert abs(value) <= 0.5 + 1e-9

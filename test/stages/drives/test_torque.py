@@ -55,7 +55,7 @@ def wheel(**parameters):
 
 
 def command(effort):
-    return EffortCommand(0, effort)
+    return EffortCommand(0, (effort,))
 
 
 # Inertia 0.5: an effort of 1 gives 2 rad/s². Commands hold for 100 ms.
@@ -166,7 +166,7 @@ def test_a_refused_command_changes_nothing(effort, reason):
 def test_torque_drive_reports_command_stamp_and_max_age():
     turned = wheel(timeout=0.25)
     assert (turned.stamp, turned.max_age) == (0, 250 * MS)
-    turned.offer(EffortCommand(5, 1.0), BEGIN)
+    turned.offer(EffortCommand(5, (1.0,)), BEGIN)
     assert turned.stamp == BEGIN, "not the message's, which may be 0"
 
 

@@ -70,7 +70,7 @@ def test_spatial_torque_drive_follows_lagrange_multipliers(name):
         return list(motion.joint_loads(joint, load.constant + pull))
 
     crank = drive(closure, Loads(GRAVITY, applied=applied), start=at, rate=0.5)
-    crank.offer(EffortCommand(0, effort), BEGIN)
+    crank.offer(EffortCommand(0, (effort,)), BEGIN)
     crank.state(BEGIN)
     now = crank.state(BEGIN + 80 * MS)
     expected = by_multipliers(closure, (at, 0.5), 0.08, effort, loads)
@@ -103,7 +103,7 @@ def test_rssr_bounces_at_a_hard_stop_and_rests():
     closure = limited(weighed('rssr'), -inf, 0.5)
     loads = Loads(GRAVITY, drive_inertia=0.01)
     crank = drive(closure, loads, start=0.3, restitution=0.5, timeout=3600.0)
-    crank.offer(EffortCommand(0, 2.0), BEGIN)
+    crank.offer(EffortCommand(0, (2.0,)), BEGIN)
     states = [crank.state(BEGIN + time * MS) for time in range(1500)]
     angles, rates = np.array([(*state.angles, *state.rates) for state in states]).T
     assert angles.max() == 0.5
@@ -117,7 +117,7 @@ def test_rssr_rests_on_a_soft_stop():
     crank = drive(
         closure, Loads(GRAVITY, drive_inertia=0.01, applied=stops), start=0.3, timeout=60.0
     )
-    crank.offer(EffortCommand(0, 2.0), BEGIN)
+    crank.offer(EffortCommand(0, (2.0,)), BEGIN)
     state = [crank.state(BEGIN + time * MS) for time in range(3000)][-1]
     mechanics = Mechanics(closure, Loads(GRAVITY))
     slope = mechanics.motion_terms(closure.close_unlimited(*state.angles)).potential_slope
@@ -146,7 +146,7 @@ def test_spatial_joint_friction_opposes_the_joint_rates(name):
         return parts
 
     crank = drive(closure, Loads(GRAVITY), friction, start=at, rate=3.0)
-    crank.offer(EffortCommand(0, effort), BEGIN)
+    crank.offer(EffortCommand(0, (effort,)), BEGIN)
     crank.state(BEGIN)
     now = crank.state(BEGIN + 40 * MS)
     expected = by_multipliers(closure, (at, 3.0), 0.04, effort, loads)

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 """Two four-bars in one file, each with its input: each moves as it does alone in its own file."""
 
-from linkage_ros.messages import EffortCommand, EffortsCommand
+from linkage_ros.messages import EffortCommand
 import pytest
 
 from ...support.messages import read_joint_state
@@ -103,9 +103,7 @@ def run(name, numbers, milliseconds=250):
         now = BEGIN + time * MS
         commands = tuple(command_at(name, n, time) for n in numbers)
         if any(command is not None for command in commands):
-            alone = len(numbers) == 1
-            given = EffortCommand(0, commands[0]) if alone else EffortsCommand(0, commands)
-            assert crank.offer(given, now) is None
+            assert crank.offer(EffortCommand(0, commands), now) is None
         tick = pipeline.tick(now)
         state = read_joint_state(tick.message)
         motor = read_joint_state(tick.extras[0])
