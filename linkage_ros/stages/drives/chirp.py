@@ -32,13 +32,8 @@ from typing import NamedTuple
 
 from linkage_ros.description import choice, each_part, flag, number
 from linkage_ros.messages import NANOSECONDS
-from linkage_ros.stages.drives.clocked import (
-    as_integers,
-    ClockedDrive,
-    Curve,
-    InputMotion,
-    LARGEST,
-)
+from linkage_ros.stages.drives.clocked import as_integers, ClockedDrive, Curve, InputMotion
+from linkage_ros.stages.drives.drive import LARGEST
 
 _FINEST = 2**60
 

@@ -23,9 +23,6 @@ from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics import call, Closure, InputSweep
 from linkage_ros.stages.drives.drive import Context, CrankState, Drive, FormulaCrank
 
-LARGEST = 1e10
-"""Bound on values and rates of an input, in [rad], [m], [rad/s] or [m/s]."""
-
 Curve = Callable[[int], tuple[float, float, float]]
 """
 Value, rate and acceleration of an input at a time since the first tick, in [ns].

@@ -34,7 +34,8 @@ from math import copysign, inf, sqrt
 from linkage_ros.description import choice, each_part, flag, number_rows
 from linkage_ros.errors import DefinitionError
 from linkage_ros.messages import NANOSECONDS
-from linkage_ros.stages.drives.clocked import ClockedDrive, Curve, InputMotion, LARGEST
+from linkage_ros.stages.drives.clocked import ClockedDrive, Curve, InputMotion
+from linkage_ros.stages.drives.drive import LARGEST
 
 _Polynomial = tuple[float, float, float, float, float]
 

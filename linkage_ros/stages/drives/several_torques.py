@@ -13,11 +13,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.stages.drives.drive import CrankAtRest, CrankState
+from linkage_ros.stages.drives.drive import Context, CrankAtRest, CrankState
 from linkage_ros.stages.drives.torque_crank import PUSHES, TorqueCrank, without_winding
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics import HeldWrench, InputMotors, InputVector, InputWindings
+    from linkage_ros.dynamics import InputMotors, InputVector, InputWindings
     from linkage_ros.stages.drives.torque import TorqueDrive
 
 
@@ -31,15 +31,12 @@ class SeveralTorqueCrank(TorqueCrank):
         mechanism: Any,
         start: Any,
         uses: Sequence[TorqueDrive],
-        period: int,
-        most: Sequence[float],
+        context: Context,
         motors: InputMotors | InputWindings,
-        wrenches: tuple[HeldWrench, ...] = (),
-        exerts_effort: bool = False,
     ) -> None:
         self._motors, self._chatter_seen = motors, 0
         self._ratios = [use.motor.ratio if use.motor else 1.0 for use in uses]
-        super().__init__(mechanism, start, uses, period, most, None, wrenches, exerts_effort)
+        super().__init__(mechanism, start, uses, context)
 
     def _drive_by(self, commands: Sequence[float | None]) -> tuple[Any, Any, Any]:
         return self._motors.drive_by(self._mechanism, commands, self._brake)

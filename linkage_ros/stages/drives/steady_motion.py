@@ -23,13 +23,8 @@ from math import cos, inf, sin, tau
 
 from linkage_ros.description import each_part, number
 from linkage_ros.messages import NANOSECONDS
-from linkage_ros.stages.drives.clocked import (
-    as_integers,
-    ClockedDrive,
-    Curve,
-    InputMotion,
-    LARGEST,
-)
+from linkage_ros.stages.drives.clocked import as_integers, ClockedDrive, Curve, InputMotion
+from linkage_ros.stages.drives.drive import LARGEST
 
 
 @dataclass(frozen=True, slots=True)

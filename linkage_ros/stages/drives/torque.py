@@ -28,7 +28,7 @@ from linkage_ros.description import choice, each_part, number, optional_section,
 from linkage_ros.dynamics import LARGEST, METHODS, SingleDofMechanism
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, describe_ranges
-from linkage_ros.messages import JOINT_STATE_TYPE, JointEffortReader, NANOSECONDS
+from linkage_ros.messages import JOINT_STATE_TYPE, JointEffortReader
 from linkage_ros.stages.drives.drive import Context, Drive, Reader
 from linkage_ros.stages.drives.torque_crank import TorqueCrank
 
@@ -250,14 +250,11 @@ def _build_single(parameters: TorqueDrive, context: Context) -> TorqueCrank:
     """Build the crank of a linkage with one input."""
     motion = _build_motion(parameters, context)
     given = context.closure.linkage.inputs[0]
-    most = given.limits.effort
     motor = None
     if parameters.motor is not None:
         key = parameters.key_for(given.joint, 'motor')
-        motor = _build_motor(parameters.motor, most, key)
+        motor = _build_motor(parameters.motor, given.limits.effort, key)
         motion = motor.mount_on(motion)
-        if parameters.motor.command != 'effort':
-            most = LARGEST
     start = motion.state_at(parameters.start, parameters.rate)
     if start is None:
         raise DefinitionError(
@@ -265,15 +262,9 @@ def _build_single(parameters: TorqueDrive, context: Context) -> TorqueCrank:
             f'at {parameters.start:g} {given.unit} nothing can be moved: a toggle, or no inertia',
             'start elsewhere',
         )
-    mechanics = context.mechanics
     low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
-    _check_step(parameters, mechanics, motor, (low, high))
-    period = round(NANOSECONDS / context.rate) if context.rate else 0
-    wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
-    # An effect of the user's may ask for it.
-    exerts = any(name == 'effort' or '.' in name for name in context.effects)
-    most = min(most, LARGEST)
-    return TorqueCrank(motion, start, (parameters,), period, (most,), motor, wrenches, exerts)
+    _check_step(parameters, context.mechanics, motor, (low, high))
+    return TorqueCrank(motion, start, (parameters,), context, motor)
 
 
 def _build_motion(parameters: TorqueDrive, context: Context) -> Any:
@@ -406,12 +397,6 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
         _build_motor(use.motor, given.limits.effort, key) if use.motor else None
         for use, given, key in zip(uses, inputs, keys, strict=True)
     ]
-    most = tuple(
-        LARGEST
-        if use.motor and use.motor.command != 'effort'
-        else min(given.limits.effort, LARGEST)
-        for use, given in zip(uses, inputs, strict=True)
-    )
     mechanism, start = _build_mechanism(parameters, uses, context)
     plays = {
         index: MotorPlay(use.play.width, use.play.inertia, use.play.restitution)
@@ -428,16 +413,13 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
     if mechanics.applied:
         mobility = start.terms.mobility
         mechanics.applied.check_step_at(start.value, mobility, parameters.method, parameters.step)
-    wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
-    period = round(NANOSECONDS / context.rate) if context.rate else 0
-    exerts = any(name == 'effort' or '.' in name for name in context.effects)
     drives = [*range(len(inputs))]
     for at, index in enumerate(plays, len(inputs)):
         drives[index] = at
     motors = motors_of(built, drives)
     moved = motors.mount_on(behind_play(mechanism, plays) if plays else mechanism)
     begin = moved.state_at(*([*of, *[of[n] for n in plays]] for of in (start.value, start.rate)))
-    return SeveralTorqueCrank(moved, begin, uses, period, most, motors, wrenches, exerts)
+    return SeveralTorqueCrank(moved, begin, uses, context, motors)
 
 
 def _build_mechanism(

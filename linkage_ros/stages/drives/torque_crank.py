@@ -26,7 +26,7 @@ from typing import Any, TYPE_CHECKING
 from linkage_ros.dynamics import LARGEST, Motion
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages import EffortCommand, NANOSECONDS, Rejection
-from linkage_ros.stages.drives.drive import Crank, CrankAtRest, CrankState
+from linkage_ros.stages.drives.drive import Context, Crank, CrankAtRest, CrankState
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics import HeldWrench, Motor, Winding
@@ -64,10 +64,10 @@ class TorqueCrank(Crank):
     limit whole steps are skipped, as if the mechanism had stood still.
 
     The mechanism is a `SingleDofMechanism` or `linkage_ros.dynamics.two_masses.TwoMasses`.
-    ``uses`` has the parameters of the drive for each input, ``period`` is the time from tick to
-    tick, in [ns]; 0 if unknown. Commands are clipped to ±``most`` of their input, in [N·m] or [N],
-    or for a motor in [A] or [V]. A message commands the inputs that it names; the commands of the
-    others go on, each for the same time from its own arrival.
+    ``uses`` has the parameters of the drive for each input. Commands are clipped to the effort
+    limit of their input, in [N·m] or [N]; in [A] or [V] to ±`LARGEST`. A message commands the
+    inputs that it names; the commands of the others go on, each for the same time from its own
+    arrival.
     """
 
     __slots__ = (
@@ -120,22 +120,24 @@ class TorqueCrank(Crank):
         mechanism: Any,
         start: Any,
         uses: Sequence[TorqueDrive],
-        period: int,
-        most: Sequence[float],
+        context: Context,
         motor: Motor | Winding | None = None,
-        wrenches: tuple[HeldWrench, ...] = (),
-        exerts_effort: bool = False,
     ) -> None:
-        self.exerts_effort = exerts_effort
+        # An effect of the user's may ask for it.
+        self.exerts_effort = any(name == 'effort' or '.' in name for name in context.effects)
         self._mechanism = mechanism
         self._motion = self._shown = start
         use = uses[0]
         self._step = round(use.step * NANOSECONDS)
         # A scene with slow ticks must not skip time between them.
+        period = round(NANOSECONDS / context.rate) if context.rate else 0
         self._made_up = self._most_made_up = max(_MADE_UP, 2 * period)
         self._time = self._boundary = self._begun = -1
         self._until = self._due = self._loaded_until = NEVER
-        self._wrenches = wrenches
+        applied = context.mechanics.applied
+        self._wrenches: tuple[HeldWrench, ...] = (
+            tuple(applied.wrenches.values()) if applied else ()
+        )
         self._motor, self._brake = motor, use.brake
         motors = [use.motor for use in uses]
         self._delays = [round(one.delay * NANOSECONDS) if one else 0 for one in motors]
@@ -150,7 +152,12 @@ class TorqueCrank(Crank):
         self._play = max(plays, key=lambda play: play.on_chatter == 'end', default=None)
         self._least_made_up = max(_HURRIED, 2 * period)
         self.max_age = round(use.timeout * NANOSECONDS)
-        self._most = most
+        self._most = [
+            LARGEST
+            if use.motor and use.motor.command != 'effort'
+            else min(given.limits.effort, LARGEST)
+            for use, given in zip(uses, context.closure.linkage.inputs, strict=True)
+        ]
         self.stamp = self.lost = self.saturated = 0
         self._acting = self.actuation_for(*self._commands)
 
