@@ -23,8 +23,9 @@ from typing import NamedTuple
 
 from bench.report import fill_marks, table_lines
 from linkage_ros.cli import Table
-from linkage_ros.description import LINKAGE_FILE, load_scene, parse_scene, Scene, SCENE_FILE
-from linkage_ros.errors import list_names
+from linkage_ros.description import LINKAGE_FILE, load, load_scene, parse_scene, Scene, SCENE_FILE
+from linkage_ros.errors import check_installed, list_names
+from linkage_ros.kinematics import InputSweep, PlanarClosure, Status
 from linkage_ros.resources import shipped_path
 from linkage_ros.stages.effects import effect_class, EFFECTS, ForceEffect, needed_effects
 from linkage_ros.tools.study import (
@@ -32,12 +33,12 @@ from linkage_ros.tools.study import (
     budget_svg,
     budget_table,
     closing_lines,
-    compare_hard_cases,
     compare_runs,
+    compare_solver,
+    comparison_solvers,
     describe_machine,
-    DISTANCES,
     error_text,
-    HardCase,
+    exact_joints,
     lead_lines,
     leave_out,
     measure_budget,
@@ -45,6 +46,7 @@ from linkage_ros.tools.study import (
     price_scenes,
     price_text,
     Progress,
+    scene_solver,
     tick_price,
     turn_crank,
 )
@@ -55,6 +57,9 @@ METHOD, EFFECT_COSTS = DOCS / 'accuracy/method.md', DOCS / 'accuracy/effects.md'
 FOUR_BAR = shipped_path('linkages/four_bar.yaml')
 
 _MARK = 'measured'
+
+DISTANCES = tuple(10.0 ** (-k / 2.0) for k in range(4, 19))
+"""Distances of hard cases from a toggle or change point: 1e-2 to 1e-9."""
 
 
 class Shown(NamedTuple):
@@ -172,6 +177,54 @@ def _section(shown: Shown, budget: Budget, picture: str, *, quick: bool) -> Iter
     yield ''
     yield from (f'{escaped(line).capitalize()}.' for line in closing_lines(budget)[:1])
     yield ''
+
+
+class HardCase(NamedTuple):
+    """How a way to solve does next to a singular pose."""
+
+    place: str  # 'toggle of double_rocker'
+    solver: str
+    worst: float  # Greatest error where it answers, in [rad]
+    failed: int  # States without an answer, or with another pose
+    states: int  # All states, `DISTANCES` from the singular pose
+
+
+def compare_hard_cases() -> Iterator[HardCase]:
+    """Yield who fails next to a toggle and at a change point, on linkages of the package."""
+    check_installed('flint')
+    for name, place, near in (
+        ('double_rocker', 'toggle', _near_toggle),
+        ('parallelogram', 'change point', _near_change_point),
+    ):
+        closure = load(name)
+        states, distances = near(closure)
+        known, exact = exact_joints(closure, states)
+        # Next to a change point the other assembly is as near as the change point itself.
+        limits = [0.1 * distances[states.index(tuple(state))] for state in known]
+        far = limits if place == 'change point' else None
+        for solver in (scene_solver(closure), *comparison_solvers(closure)):
+            error, failed = compare_solver(closure, solver.solve, known, exact, far)
+            yield HardCase(f'{place} of {name}', solver.label, error.worst, failed, len(known))
+
+
+def _near_toggle(closure: PlanarClosure) -> tuple[list[tuple[float, ...]], list[float]]:
+    interval = InputSweep(closure).widest_range
+    assert interval is not None, 'it has one'
+    unit = 1.0 if interval.turning else closure.slide_bound
+    return _closing_states(closure, interval.highest, [-unit * distance for distance in DISTANCES])
+
+
+def _near_change_point(closure: PlanarClosure) -> tuple[list[tuple[float, ...]], list[float]]:
+    places = [x.value for x in closure.singular_inputs if x.status is Status.CHANGE_POINT]
+    offsets = [*(-distance for distance in DISTANCES), *reversed(DISTANCES)]
+    return _closing_states(closure, min(places, key=abs), offsets)
+
+
+def _closing_states(
+    closure: PlanarClosure, place: float, offsets: Sequence[float]
+) -> tuple[list[tuple[float, ...]], list[float]]:
+    kept = [o for o in offsets if closure.position(place + o).status is Status.CLOSED]
+    return [(place + offset,) for offset in kept], [abs(offset) for offset in kept]
 
 
 def hard_lines() -> Iterator[str]:

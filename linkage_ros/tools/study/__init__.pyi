@@ -91,8 +91,9 @@ from linkage_ros.tools.study.prices import (
 from linkage_ros.tools.study.recording import measure_recording as measure_recording
 from linkage_ros.tools.study.scene_motion import motions_of as motions_of
 from linkage_ros.tools.study.solving import (
-    compare_hard_cases as compare_hard_cases,
-    DISTANCES as DISTANCES,
-    HardCase as HardCase,
+    compare_solver as compare_solver,
+    comparison_solvers as comparison_solvers,
+    exact_joints as exact_joints,
     measure_solving as measure_solving,
+    scene_solver as scene_solver,
 )

@@ -25,17 +25,14 @@ from math import inf, sqrt
 from time import process_time
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.description import read_linkage, read_yaml
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.kinematics import (
     Closure,
     InputSweep,
     is_iterated,
     PlanarClosure,
-    Status,
     usual_inputs,
 )
-from linkage_ros.resources import shipped_path
 from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.tools.study.budget_text import error_text
 from linkage_ros.tools.study.four_bar_formulas import (
@@ -75,11 +72,6 @@ _MOST = 50
 
 _BEHIND = 0.01
 """How far behind a state Newton's method starts, in [rad] or parts of the size."""
-
-DISTANCES = tuple(10.0 ** (-k / 2.0) for k in range(4, 19))
-"""Distances of hard cases from a toggle or change point: 1e-2 to 1e-9."""
-
-Near = Callable[[PlanarClosure], 'tuple[list[tuple[float, ...]], list[float]]']
 
 
 class SolvingMethod(NamedTuple):
@@ -126,7 +118,7 @@ def measure_solving(
         unproved += len(states) - len(known)
         if not known:
             continue
-        own = _scene_solver(closure)
+        own = scene_solver(closure)
         errors.append(compare_solver(closure, own.solve, known, exact)[0])
         progress(0.2)
         if index:
@@ -240,7 +232,7 @@ def largest_distance(closure: Closure, joints: Sequence[Any], balls: Sequence[An
     return worst
 
 
-def _scene_solver(closure: Closure) -> SolvingMethod:
+def scene_solver(closure: Closure) -> SolvingMethod:
     """Return what a scene solves with, as a tick does."""
     compiled = closure.compile_linkage(0)
     fast, plain = compiled.fast, compiled.run_interpreted
@@ -280,7 +272,7 @@ def _iterated_solver(closure: Closure, steps: int, halvings: int) -> SolvingMeth
         step.iterate_by(steps, halvings)
     label = f'{ITERATED}, {steps} step{"s" * (steps > 1)}'
     label += f' from cells 1/{2**halvings} as wide' if halvings else ''
-    return SolvingMethod(label, _scene_solver(changed).solve)
+    return SolvingMethod(label, scene_solver(changed).solve)
 
 
 def _solve_to_digits(closure: Closure) -> Solve:
@@ -338,55 +330,6 @@ def _timed_candidate(solve: Solve, states: Sequence[Sequence[float]]) -> Candida
             solve(*state)
 
     return Candidate(run, len(forward_and_backward))
-
-
-class HardCase(NamedTuple):
-    """How a way to solve does next to a singular pose."""
-
-    place: str  # 'toggle of double_rocker'
-    solver: str
-    worst: float  # Greatest error where it answers, in [rad]
-    failed: int  # States without an answer, or with another pose
-    states: int  # All states, `DISTANCES` from the singular pose
-
-
-def compare_hard_cases() -> Iterator[HardCase]:
-    """Yield who fails next to a toggle and at a change point, on linkages of the package."""
-    check_installed('flint')
-    for name, place, near in (
-        ('double_rocker', 'toggle', _near_toggle),
-        ('parallelogram', 'change point', _near_change_point),
-    ):
-        content, _ = read_yaml(shipped_path(f'linkages/{name}.yaml'))
-        closure = PlanarClosure(read_linkage(content))
-        states, distances = near(closure)
-        known, exact = exact_joints(closure, states)
-        # Next to a change point the other assembly is as near as the change point itself.
-        limits = [0.1 * distances[states.index(tuple(state))] for state in known]
-        far = limits if place == 'change point' else None
-        for solver in (_scene_solver(closure), *comparison_solvers(closure)):
-            error, failed = compare_solver(closure, solver.solve, known, exact, far)
-            yield HardCase(f'{place} of {name}', solver.label, error.worst, failed, len(known))
-
-
-def _near_toggle(closure: PlanarClosure) -> tuple[list[tuple[float, ...]], list[float]]:
-    interval = InputSweep(closure).widest_range
-    assert interval is not None, 'it has one'
-    unit = 1.0 if interval.turning else closure.slide_bound
-    return _closing_states(closure, interval.highest, [-unit * distance for distance in DISTANCES])
-
-
-def _near_change_point(closure: PlanarClosure) -> tuple[list[tuple[float, ...]], list[float]]:
-    places = [x.value for x in closure.singular_inputs if x.status is Status.CHANGE_POINT]
-    offsets = [*(-distance for distance in DISTANCES), *reversed(DISTANCES)]
-    return _closing_states(closure, min(places, key=abs), offsets)
-
-
-def _closing_states(
-    closure: PlanarClosure, place: float, offsets: Sequence[float]
-) -> tuple[list[tuple[float, ...]], list[float]]:
-    kept = [o for o in offsets if closure.position(place + o).status is Status.CLOSED]
-    return [(place + offset,) for offset in kept], [abs(offset) for offset in kept]
 
 
 class _RoundedConstraints:

@@ -12,12 +12,12 @@ from importlib import import_module
 from math import cos, inf, sin
 import re
 
+from docs.make_accuracy import compare_hard_cases
 from linkage_ros.bag import BagWriter, Topic
 from linkage_ros.description import load_scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages import JOINT_STATE_TYPE, JointStateWriter
 from linkage_ros.tools.study import (
-    compare_hard_cases,
     drive_step,
     ERRORS,
     errors_in_use,
