@@ -384,9 +384,7 @@ def follow_grid(closure: Closure) -> list[tuple[tuple[float, ...], Position]]:
     return [found[index] for index in sorted(found)]
 
 
-def find_extremes(
-    function: Callable[[float], float], ranges: Sequence[InputRange], count: int = _SAMPLES
-) -> SweptCurve:
+def find_extremes(function: Callable[[float], float], ranges: Sequence[InputRange]) -> SweptCurve:
     """
     Find the lowest and the highest value of a function of the input.
 
@@ -394,7 +392,7 @@ def find_extremes(
     """
     sampled = []
     for interval in ranges:
-        values = sample_inputs(interval, count)
+        values = sample_inputs(interval)
         sampled.append(Sampled(interval, values, [function(value) for value in values]))
     return _min_max_curve(function, sampled)
 

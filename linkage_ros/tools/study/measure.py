@@ -50,7 +50,6 @@ def measure_budget(
     like: str | None = None,
     quick: bool = False,
     parts: Sequence[str] = PARTS,
-    folder: Path | None = None,
     progress: Progress = lambda _: None,
 ) -> Budget:
     """
@@ -59,8 +58,8 @@ def measure_budget(
     Its motion is followed for ``horizon``, in [s]. ``like`` says what a topic drive's crank does,
     or which commands a torque drive gets: 'sine', or the path of a bag. A ``quick`` measurement
     takes less than 20 s, with fewer settings; ``parts`` are among `PARTS`. Recording is measured
-    on the disk of ``folder``, by default the present one. ``progress`` is called now and then with
-    the fraction that is done; an exception from it ends the measurement.
+    on the disk of the present folder. ``progress`` is called now and then with the fraction that
+    is done; an exception from it ends the measurement.
 
     A LinkageError is raised if the scene has no motion, it runs away before the horizon, its loops
     do not close, or a package is not installed.
@@ -102,7 +101,7 @@ def measure_budget(
         )
 
         losses = measure_recording(
-            scene, folder or Path(), quick=quick, feed=feed, progress=part_progress(RECORDING)
+            scene, Path(), quick=quick, feed=feed, progress=part_progress(RECORDING)
         )
     progress(1.0)
     today = datetime.now().astimezone().date().isoformat()

@@ -90,21 +90,13 @@ class Candidate(NamedTuple):
     states: int
 
 
-def time_in_turn(
-    candidates: Sequence[Candidate],
-    seconds: float,
-    progress: Progress = lambda _: None,
-    clock: Callable[[], float] | None = None,
-) -> list[Spread]:
+def time_in_turn(candidates: Sequence[Candidate], seconds: float) -> list[Spread]:
     """
     Return the time that each candidate takes per state, in [s]; each is run once before.
 
-    The whole takes about ``seconds``, or longer if the minimum number of rounds does. ``progress``
-    is called after each block with the fraction that is done, 0 to 1. ``clock`` returns the time,
-    in [s]; by default the processor time of the thread.
+    The whole takes about ``seconds``, or longer if the minimum number of rounds does.
     """
-    clock = clock or thread_clock()
-    repeats, block_time = [], 0.0
+    clock, repeats, block_time = thread_clock(), [], 0.0
     for run, _ in candidates:
         run()
         begun = clock()
@@ -117,8 +109,7 @@ def time_in_turn(
     forward = [*zip(candidates, repeats, times, strict=True)]
     collecting = gc.isenabled()
     try:
-        turns = enumerate(alternate_order(forward, rounds), 1)
-        for done, ((run, states), count, found) in turns:
+        for (run, states), count, found in alternate_order(forward, rounds):
             gc.disable()
             begun = clock()
             for _ in range(count):
@@ -127,7 +118,6 @@ def time_in_turn(
             if collecting:
                 gc.enable()
             found.append(taken / (count * states))
-            progress(done / (rounds * len(forward)))
     finally:
         if collecting:
             gc.enable()

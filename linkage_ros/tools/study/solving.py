@@ -41,7 +41,7 @@ from linkage_ros.tools.study.four_bar_formulas import (
     solve_by_textbook,
     solve_in_single_precision,
 )
-from linkage_ros.tools.study.measuring import Candidate, Progress, time_in_turn
+from linkage_ros.tools.study.measuring import Candidate, time_in_turn
 from linkage_ros.tools.study.member_motion import cranks_at, draw_times, LinkageMotion, size_of
 import numpy as np
 
@@ -88,14 +88,12 @@ def measure_solving(
     *,
     quick: bool = False,
     seconds: float = 2.0,
-    progress: Progress = lambda _: None,
 ) -> Knob:
     """
     Return the error of solving the linkages of a scene along their motion.
 
     The comparisons are made for the first of the motions. The rate is in [Hz], the horizon in [s];
-    ``seconds`` is the time for the prices. A ``quick`` measurement takes fewer states;
-    ``progress`` gets the fraction that is done.
+    ``seconds`` is the time for the prices. A ``quick`` measurement takes fewer states.
 
     A LinkageError is raised if a package for the proof is missing, or nothing can be proved of the
     motion.
@@ -120,7 +118,6 @@ def measure_solving(
             continue
         own = scene_solver(closure)
         errors.append(compare_solver(closure, own.solve, known, exact)[0])
-        progress(0.2)
         if index:
             continue
         candidates.append((own.label, errors[0], _timed_candidate(own.solve, known)))
@@ -140,7 +137,7 @@ def measure_solving(
     worst = JointError(
         sqrt(sum(e.rms**2 for e in errors) / len(errors)), max(e.worst for e in errors)
     )
-    times_of = time_in_turn([one for _, _, one in candidates], seconds, progress)
+    times_of = time_in_turn([one for _, _, one in candidates], seconds)
     settings = [
         Setting(label, error, Price(spread.scale(1e6), rate), None)
         for (label, error, _), spread in zip(candidates, times_of, strict=True)
