@@ -37,7 +37,6 @@ from linkage_ros.kinematics.step import LinkState
 if TYPE_CHECKING:
     from linkage_ros import LinkagePage
     from linkage_ros.kinematics.analysis.point_tracker import PointTracker
-    from linkage_ros.kinematics.results import Position, Velocity
 
 
 class PlanarClosure(Closure):

@@ -138,7 +138,7 @@ async def _answer(
 ) -> None:
     try:
         said = await asyncio.wait_for(asyncio.wrap_future(bridge.send_request(content)), _PATIENCE)
-    except TimeoutError:
+    except asyncio.TimeoutError:
         said = f'{bridge.name} does not answer'
     await socket.send_str(json.dumps({'said': said, 'do': content['do']}))
 
