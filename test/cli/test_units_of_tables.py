@@ -175,6 +175,32 @@ def test_scene_in_si_prints_units_of_its_linkage(tmp_path: Path, own: bool) -> N
     }
 
 
+@pytest.mark.parametrize(
+    ('unit', 'one'), [('m', 1.0), ('cm', 100.0), ('mm', 1e3), ('in', 1 / 0.0254)]
+)
+@pytest.mark.parametrize('typed', [['plot', 'bag'], ['compare', 'bag', 'other']])
+def test_pictures_of_bags_have_the_units_of_their_file(
+    tmp_path: Path, typed: list[str], unit: str, one: float
+) -> None:
+    """A crank of 2 m: what metres show is told in metres."""
+    pytest.importorskip('matplotlib')
+    lengths = {'r': 2.0 * one, 'l': 5.0 * one}
+    (tmp_path / 'l.yaml').write_text(f'units: {unit}\n{LINKAGE.format(**lengths)}')
+    (tmp_path / 'topic.yaml').write_text(SCENE.format(drive='{topic: {}}', noise=0.0005))
+    for name, rate in (('bag', 20.0), ('other', 60.0)):
+        Recorded(
+            tmp_path / name,
+            tmp_path / 'topic.yaml',
+            lambda tick, rate=rate: {'crank_joint': (0.01 * rate * tick, rate)},
+        ).run(20)
+    answer = linkage(tmp_path, *typed, '-o', 'x.svg')
+    assert answer.returncode == 0, answer.stderr
+    axes = re.findall(r'<!-- (.*slide) \[(.*)\] -->', (tmp_path / 'x.svg').read_text())
+    wanted = {'rate of slide': f'{unit}/s', 'slide': unit, 'difference of slide': unit}
+    assert len(axes) == (2 if typed[0] == 'plot' else 1)
+    assert {(name, wanted[name]) for name, _ in axes} == {*axes}
+
+
 def test_study_table_has_the_units_of_the_scene(folders: list[Path]) -> None:
     tables = []
     for folder, values in zip(

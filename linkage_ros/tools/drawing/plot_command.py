@@ -54,8 +54,8 @@ from linkage_ros.names import picture_text
 from linkage_ros.replay import replay_ticks
 from linkage_ros.signals import StoppedError
 from linkage_ros.tick import Pipeline
-from linkage_ros.tools.drawing.figure import label_joints, plot_joints, stacked_axes
-from linkage_ros.tools.drawing.painting import picture_settings, save_picture, show_lengths
+from linkage_ros.tools.drawing.figure import label_across, label_joints, plot_joints, stacked_axes
+from linkage_ros.tools.drawing.painting import picture_settings, save_picture
 import numpy as np
 from numpy.typing import NDArray
 
@@ -160,7 +160,7 @@ def draw_bag(
     title = f'{scene.name}: {len(positions)} joint states'
     driven = None if over_time else scene_linkage.linkage.inputs[0]
     derivatives = {'rate': joint_rates, 'acceleration': joint_accelerations}
-    _paint_curves(title, driven, joints, derivatives, picture)
+    _paint_curves(title, driven, joints, derivatives, picture, scene.units.length)
 
 
 def _acceleration_reader(scene: Scene) -> Callable[[Sequence[bytes]], Values]:
@@ -310,6 +310,7 @@ def _paint_curves(
     joints: Sequence[Curve],
     derivatives: Mapping[str, Sequence[Curve]],
     picture: Path,
+    length: str,
 ) -> None:
     """Paint joints and their derivatives over the crank; over time, if none is driven."""
     context = picture_settings()
@@ -326,20 +327,19 @@ def _paint_curves(
         drawn = []
         in_degrees = driven is not None and not driven.slider
         for panels, (name, part) in zip(stacked, parts.items(), strict=True):
-            drawn.append((panels, part, plot_joints(panels, part, degrees_x=in_degrees)))
-            for axes in panels.values() if name else ():
-                axes.yaxis.set_major_locator(AutoLocator())
+            lines = plot_joints(panels, part, degrees_x=in_degrees, length=length)
+            drawn.append((panels, part, lines))
+            for turning, axes in panels.items() if name else ():
+                if turning:
+                    axes.yaxis.set_major_locator(AutoLocator())
                 quantity = axes.get_ylabel()[:-1]
                 axes.set_ylabel(f'{name} of {quantity}/{_PER[name]}]')
         lowest = list(drawn[-1][0].values())[-1]
         if driven is None:
             lowest.set_xlabel('time since the first joint state [s]')
-        elif driven.slider:
-            show_lengths(
-                lowest.xaxis, picture_text(driven.joint), max(map(abs, lowest.get_xlim()))
-            )
         else:
-            lowest.set_xlabel(f'{picture_text(driven.joint)} [°]')
+            unit = 'm' if driven.slider else '°'
+            label_across(lowest, picture_text(driven.joint), unit, length)
         figure.suptitle(picture_text(title, 160))
         figure.align_ylabels()
         figure.draw_without_rendering()  # only now axes and texts have a size

@@ -183,7 +183,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     picture = arguments.output is not None and arguments.output.suffix.lower() in PICTURES
     if picture:
         title = f'{arguments.other.name} against {arguments.bag.name}'
-        _draw_differences(differences, turning, title, arguments.output)
+        length = scenes[0].units.length
+        _draw_differences(differences, turning, title, arguments.output, length)
     head = (
         f'{account["other"]} against {account["bag"]}: {account["compared"]} joint states, '
         f'{account["seconds"]:.3f} s'
@@ -253,7 +254,7 @@ def _compare_states(
 
 
 def _draw_differences(
-    differences: BagDifferences, turning: Mapping[str, bool], title: str, file: Path
+    differences: BagDifferences, turning: Mapping[str, bool], title: str, file: Path, length: str
 ) -> None:
     """Draw the least and the greatest difference of each joint over the time."""
     context = picture_settings()
@@ -277,7 +278,7 @@ def _draw_differences(
     with context:
         figure = Figure(figsize=(8.0, 0.8 + 2.6 * panels), dpi=120, layout='constrained')
         (axes_of,) = stacked_axes(figure.add_gridspec, [curves])
-        lines = plot_joints(axes_of, curves, degrees_x=False)
+        lines = plot_joints(axes_of, curves, degrees_x=False, length=length)
         for column, curve in enumerate(curves):
             low, high = (np.degrees(each) if curve.turning else each for each in (lows, highs))
             axes_of[curve.turning].fill_between(
@@ -288,8 +289,9 @@ def _draw_differences(
                 alpha=0.3,
                 linewidth=0,
             )
-        for axes in axes_of.values():
-            axes.yaxis.set_major_locator(AutoLocator())
+        for are_angles, axes in axes_of.items():
+            if are_angles:
+                axes.yaxis.set_major_locator(AutoLocator())
             axes.set_ylabel(f'difference of {axes.get_ylabel()}')
         axes.set_xlabel('time since the first joint state [s]')
         figure.suptitle(picture_text(title, 160))
