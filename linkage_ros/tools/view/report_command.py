@@ -41,7 +41,7 @@ from linkage_ros.cli import (
     show_progress,
     Table,
 )
-from linkage_ros.description import atomic_write, Scene
+from linkage_ros.description import atomic_write, Scene, Units
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.signals import StoppedError
 from linkage_ros.tools.view.report import (
@@ -110,6 +110,7 @@ def bag_page(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool
             warnings=list(_find_warnings(bag, account, found, scene, missing)),
             tables=_page_tables(account),
             wrapped=scene is not None and scene.wrapped,
+            units=scene.units if scene is not None else Units(),
         ),
     )
     _raise_if_stopped(stop)

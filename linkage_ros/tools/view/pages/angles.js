@@ -15,7 +15,9 @@ const Angles = (() => {
   /** Return the unit in which numbers of an SI unit are shown, and the factor to it. */
   function shown(unit) {
     const degrees = chosen.degrees && IN_DEGREES[unit];
-    if (unit === 'm') return { unit: chosen.length.length, factor: 1 / chosen.length.factor };
+    if (/^m(\/s)?$/.test(unit)) {
+      return { unit: unit.replace('m', chosen.length.length), factor: 1 / chosen.length.factor };
+    }
     return degrees ? { unit: degrees, factor: 1 / DEGREE } : { unit, factor: 1 };
   }
 

@@ -241,18 +241,20 @@ const Picture = (() => {
 
     drawScale(pen) {
       const { scale, tall } = this.size;
-      const power = 10 ** Math.floor(Math.log10(120 / scale));
-      const length = [5, 2, 1].map((k) => k * power).find((each) => each * scale <= 120);
+      // In the unit of the file; if that is the metre, in millimetres where less than one.
+      let { length: unit, factor } = Angles.chosen.length;
+      if (unit === 'm' && scale > 120) [unit, factor] = ['mm', 1e-3];
+      const power = 10 ** Math.floor(Math.log10(120 / (scale * factor)));
+      const count = [5, 2, 1].map((k) => k * power).find((each) => each * scale * factor <= 120);
       const [x, y] = [12.5, tall - 8.5];
-      const end = x + length * scale;
+      const end = x + count * scale * factor;
       pen.beginPath();
       for (const [px, py] of [[x, y - 4], [x, y], [end, y], [end, y - 4]]) pen.lineTo(px, py);
       pen.lineWidth = 1;
       pen.strokeStyle = pen.fillStyle = this.ink.faint;
       pen.stroke();
       pen.font = `11px ${getComputedStyle(document.body).fontFamily}`;
-      const millimetres = Number((length * 1e3).toPrecision(3));
-      pen.fillText(length < 1 ? `${millimetres} mm` : `${length} m`, end + 6, y + 2);
+      pen.fillText(`${Number(count.toPrecision(3))} ${unit}`, end + 6, y + 2);
     }
   }
 

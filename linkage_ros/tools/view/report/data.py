@@ -30,6 +30,7 @@ from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from linkage_ros.description import Units
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics import (
     frames_of_links,
@@ -194,7 +195,7 @@ def _loop_gaps(closure: PlanarClosure, found: _Found, count: int) -> Numbers:
     return worst
 
 
-def page_data(run: ReportedRun, wrapped: bool) -> dict[str, Any]:
+def page_data(run: ReportedRun, wrapped: bool, units: Units) -> dict[str, Any]:
     """Return the data of a page, as JSON holds them; wrapped angles jump from π to −π."""
     since = max(0, run.window.since)
     until = max(since, min(run.end, run.window.until))
@@ -202,7 +203,11 @@ def page_data(run: ReportedRun, wrapped: bool) -> dict[str, Any]:
     return {
         'since': since / 1e9,
         'until': until / 1e9,
-        'wrapped': wrapped,
+        'units': {
+            'wrapped': wrapped,
+            'degrees': units.angle == 'degrees',
+            'length': {'length': units.length, 'factor': units.to_si(1.0, 'm')},
+        },
         'curves': [_curves_json(curves) for curves in run.curves],
         'plots': time_plots(run),
         'frames': _frames_json(frames) if frames is not None else None,

@@ -19,6 +19,7 @@ from html import escape
 from typing import NamedTuple
 
 from linkage_ros.cli import Table
+from linkage_ros.description import Units
 from linkage_ros.errors import LinkageError
 from linkage_ros.tools.view.pages import facts_html, html_document, table_html
 from linkage_ros.tools.view.report.data import (
@@ -102,12 +103,12 @@ def _run_table_html(table: Table) -> Iterator[str]:
         yield from table_html(table)
 
 
-def run_tables(run: ReportedRun) -> Iterator[Table]:
-    """Yield the tables of a run."""
+def run_tables(run: ReportedRun, units: Units) -> Iterator[Table]:
+    """Yield the tables of a run; its curves are in the units of its file."""
     yield Table(
         'Curves',
         ('joint', 'quantity', '>least', '>greatest', 'unit', 'on'),
-        [row for curves in run.curves for row in _curve_ranges(curves)],
+        [row for curves in run.curves for row in _curve_ranges(curves, units)],
     )
     yield Table(
         'Events',
@@ -140,12 +141,13 @@ def run_tables(run: ReportedRun) -> Iterator[Table]:
     )
 
 
-def _curve_ranges(curves: Curves) -> Iterator[tuple[str, ...]]:
+def _curve_ranges(curves: Curves, units: Units) -> Iterator[tuple[str, ...]]:
     found = curves.intervals
     for index, (name, quantity, unit) in enumerate(curves.columns):
         least = np.nanmin(np.fmin(found.first[:, index], found.second[:, index]))
         greatest = np.nanmax(np.fmax(found.first[:, index], found.second[:, index]))
-        yield name, quantity, f'{least:.9g}', f'{greatest:.9g}', unit, curves.title
+        ends = [f'{units.to_file_unit(float(end), unit):.9g}' for end in (least, greatest)]
+        yield name, quantity, *ends, units.file_unit(unit), curves.title
 
 
 class ReportHeader(NamedTuple):
@@ -160,6 +162,7 @@ class ReportHeader(NamedTuple):
     warnings: Sequence[str]
     tables: Sequence[Table]
     wrapped: bool = False
+    units: Units = Units()
 
 
 def run_html(run: ReportedRun, header: ReportHeader) -> str:
@@ -169,7 +172,7 @@ def run_html(run: ReportedRun, header: ReportHeader) -> str:
     A LinkageError is raised if plotly is not installed, or the page would be larger than
     `PAGE_BYTES`.
     """
-    data = page_data(run, header.wrapped)
+    data = page_data(run, header.wrapped, header.units)
     title = shorten_text(header.title)
     page = html_document(title, _page_body(run, header, data), data, _HERE, _FILES)
     # The limits of the parts add up to less, but names in a scene have no limit.
@@ -199,11 +202,11 @@ def _page_body(run: ReportedRun, header: ReportHeader, data: dict[str, object]) 
         yield from _player_html(run.linkages, data)
     yield '<div class="plots">'
     yield from _events_html(run)
-    yield from _plots_html(run)
+    yield from _plots_html(run, header.units)
     yield from _histograms_html(run)
     yield '</div>'
     yield '<section class="tables"><h2>In numbers</h2>'
-    yield from tables_html([*header.tables, *run_tables(run)])
+    yield from tables_html([*header.tables, *run_tables(run, header.units)])
     yield '</section></main>'
 
 
@@ -260,7 +263,7 @@ def _events_html(run: ReportedRun) -> Iterator[str]:
     yield '</section>'
 
 
-def _plots_html(run: ReportedRun) -> Iterator[str]:
+def _plots_html(run: ReportedRun, units: Units) -> Iterator[str]:
     found = time_plots(run)
     if not run.curves:
         yield '<section><h2>Over time</h2><p>No joint states are in this bag.</p></section>'
@@ -293,9 +296,8 @@ def _plots_html(run: ReportedRun) -> Iterator[str]:
         'loads': FORCE_NOTE,
     }
     for plot in found:
-        yield _plot_html(
-            plot['key'], f'{plot["title"]} [{plot["unit"]}]', notes.get(plot['key'], '')
-        )
+        title = f'{plot["title"]} [{units.file_unit(plot["unit"])}]'
+        yield _plot_html(plot['key'], title, notes.get(plot['key'], ''))
     yield '</section>'
     crossed = [each for each in run.linkages if run.frames is not None and len(run.frames.times)]
     if crossed:

@@ -46,7 +46,7 @@ const OverTime = (() => {
   /** Return how angles are recorded and shown; nothing for a plot of other numbers. */
   function angleOf(plot) {
     if (plot.key !== 'positions_rad') return undefined;
-    return { recorded: data.wrapped, wrapped: Angles.chosen.wrapped };
+    return { recorded: data.units.wrapped, wrapped: Angles.chosen.wrapped };
   }
 
   /** Return which curves run on while others swing: on one scale these would be flat. */

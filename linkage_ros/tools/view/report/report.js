@@ -165,7 +165,7 @@ const Report = (() => {
   }
 
   function begin() {
-    Angles.chosen.wrapped = data.wrapped;
+    Object.assign(Angles.chosen, data.units);
     canvases = [...document.querySelectorAll('figure[data-linkage]')].flatMap((figure) => {
       const linkage = linkages[Number(figure.dataset.linkage)];
       const canvas = figure.querySelector('canvas');
@@ -224,7 +224,8 @@ const Report = (() => {
       Angles.chosen.wrapped = event.target.value === 'wrapped';
       drawAngles();
     });
-    named('range').value = data.wrapped ? 'wrapped' : 'continuous';
+    named('range').value = data.units.wrapped ? 'wrapped' : 'continuous';
+    named('unit').value = data.units.degrees ? 'degrees' : 'rad';
   }
 
   function drawAngles() {

@@ -11,6 +11,7 @@
 from math import inf, nan
 from pathlib import Path
 
+from linkage_ros.description import Units
 from linkage_ros.messages import JointStateWriter
 from linkage_ros.tools.view.report import page_data
 from linkage_ros.tools.view.report.diagnostics_summary import _COUNTED
@@ -283,7 +284,7 @@ def test_input_age_of_a_future_stamp_is_negative(tmp_path):
     assert curve(found, 'input', 'age')[1] == pytest.approx([-2.0] * 50)
     assert (found.age.count, found.age.least, found.age.greatest) == (50, -2 * MS, -2 * MS)
     # It stands in the lowest of the bins, whose percentiles are no more than it.
-    spread = page_data(found, wrapped=False)['histograms']['age']
+    spread = page_data(found, wrapped=False, units=Units())['histograms']['age']
     assert (spread['counts'], spread['percentiles']['p50']) == ([50], -0.002)
 
 

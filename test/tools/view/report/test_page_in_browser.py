@@ -12,7 +12,7 @@ from base64 import b64decode
 from cmath import rect
 from contextlib import contextmanager
 from itertools import combinations, pairwise
-from math import pi
+from math import cos, pi, sin, sqrt
 import random
 import re
 from threading import Event
@@ -443,6 +443,49 @@ def test_picture_without_a_recorded_pose_names_the_gap(drill, time):
     assert told['pose'] == 'none recorded here'
     assert 'gap in joint states' in told['going on']
     assert 'rocker_joint' not in told
+
+
+PRESS = """
+links: {{ground: {{O: [0, 0]}},
+  crank: {{O: [0, 0], A: [{r}, 0]}}, rod: {{A: [0, 0], B: [{l}, 0]}}}}
+sliders: {{press: {{point: B, along: ground, through: O, direction: [1, 0]}}}}
+assembly: {{press: ahead}}
+input: {{joint: crank_joint, parent: ground, child: crank}}
+joints: {{press_slide: {{slider: press}}}}
+"""
+PRESS_SCENE = """
+rate: 100
+drive: {{sine: {{amplitude: {amplitude}, frequency: 1}}}}
+effects: {{velocity: {{}}}}
+publish_input: true
+"""
+
+
+@pytest.mark.parametrize(('unit', 'one'), [('m', 1.0), ('mm', 1e3), ('in', 1 / 0.0254)])
+@pytest.mark.parametrize('degrees', [True, False])
+def test_page_has_the_units_of_its_file(browser, tmp_path, unit, one, degrees):
+    """The slide of a press in line is r·cos + √(l² − r²·sin²), and at most r + l."""
+    head = f'units: {unit}\nangles: {"degrees" if degrees else "radians"}\n'
+    of_angle = 180.0 / pi if degrees else 1.0
+    linkage = head + PRESS.format(r=0.04 * one, l=0.125 * one)
+    scene = bags.scene_file(tmp_path, head + PRESS_SCENE.format(amplitude=0.5 * of_angle), linkage)
+    simulate_run(load_scene(scene), tmp_path / 'bag', 101, lambda _: True)
+    file = page_of(tmp_path / 'bag')
+    with quiet(browser, file) as page:
+        page.evaluate('Report.pause(); Report.seek(0.25)')
+        settle(page)
+        number, shown = readout(page)['press_slide'].split()[:2]
+        slide = 0.04 * cos(0.5) + sqrt(0.125**2 - (0.04 * sin(0.5)) ** 2)
+        assert (float(number), shown) == (pytest.approx(slide * one, rel=1e-5), unit)
+        captions = page.locator('[data-plot] figcaption').all_text_contents()
+        angle = '°' if degrees else 'rad'
+        assert {f'Angles [{angle}]', f'Slides [{unit}]', f'Rates of angles [{angle}/s]'} < {
+            *captions
+        }
+        assert f'Rates of slides [{unit}/s]' in captions
+        rows = [row.split('\t') for row in page.locator('.tables tr').all_inner_texts()]
+        (found,) = [row for row in rows if row[:2] == ['press_slide', 'position']]
+        assert (float(found[3]), found[4]) == (pytest.approx(0.165 * one, rel=1e-8), unit)
 
 
 def test_readout_prints_values_with_units_and_events(drill):

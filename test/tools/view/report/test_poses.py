@@ -14,7 +14,7 @@ from dataclasses import replace
 import json
 
 from linkage_ros.bag import read_bag
-from linkage_ros.description import load_scene, read_linkage, read_yaml
+from linkage_ros.description import load_scene, read_linkage, read_yaml, Units
 from linkage_ros.kinematics import (
     carried_shapes,
     Circle,
@@ -189,7 +189,7 @@ def test_gallery_links_are_drawn_at_the_recorded_inputs(tmp_path, file):
     scene = load_scene(scene_file)
     bag = run(tmp_path / 'bag', scene_file, list(moments(scene))).bag
     found = read(read_bag(bag.path))
-    data = json.loads(json.dumps(page_data(found, wrapped=False), allow_nan=False))
+    data = json.loads(json.dumps(page_data(found, wrapped=False, units=Units()), allow_nan=False))
     (linkage,) = data['linkages']
     # By the published joints, whatever linkage of the gallery; none is solved again.
     assert linkage['untold'] == ''
