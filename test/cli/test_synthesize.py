@@ -248,6 +248,7 @@ def test_synthesis_in_radians_designs_the_same_linkage(linkage: Run, kind: str) 
 
 
 def test_search_prints_its_progress(tmp_path: Path) -> None:
+    pytest.importorskip('rich')
     typed = ['--pair', '0', '0', '--pair', '30', '20', '--pair', '60', '45', '--free-zeros']
     typed += ['--candidates', '20000', '--best', '1']
     shown = on_terminal(tmp_path, 'synthesize', *typed, progress=True)

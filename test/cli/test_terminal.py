@@ -110,6 +110,7 @@ def clock(monkeypatch) -> Clock:
 
 
 def test_progress_bar_is_erased_after_the_task():
+    pytest.importorskip('rich')
     ours, theirs = pty.openpty()
     program = (
         'from linkage_ros.cli import show_progress\n'

@@ -195,6 +195,7 @@ def test_mjcf_loops_close_in_mujoco():
 
 def test_plugins_of_an_mjcf_are_left_out(tmp_path):
     """A plugin that MuJoCo does not know would be refused: here it never sees one."""
+    pytest.importorskip('mujoco')
     text = (ROBOTS / 'cassie_leg.xml').read_text('utf-8')
     plugin = '<extension><plugin plugin="a.soil"><instance name="s"/></plugin></extension>'
     geometry = '<geom type="sphere" size="0.01"><plugin instance="s"/></geom>'
