@@ -63,12 +63,20 @@ def test_tests_import_what_has_a_key_or_skip_themselves_without_it(root):
     present = {*sys.stdlib_module_names, *keys, 'linkage_ros', 'mcap', 'packaging'}
     imported = {
         name.partition('.')[0]
-        for path in (root / 'test').rglob('*.py')
-        for statement in ast.parse(path.read_text(encoding='utf-8')).body
+        for folder in ('test', 'linkage_ros')
+        for path in (root / folder).rglob('*.py')
+        # The package imports locally what a robot may lack; a test, what nobody has.
+        for statement in statements_of(path, only_at_head=folder == 'test')
         for name in imported_modules(statement)
     }
     assert {'numpy', 'scipy'} < imported
     assert imported - present - WITHOUT_KEY == {'bench', 'campaigns', 'docs'}
+
+
+def statements_of(path, only_at_head):
+    """Return the statements of a file, or those that stand in no other."""
+    tree = ast.parse(path.read_text(encoding='utf-8'))
+    return tree.body if only_at_head else ast.walk(tree)
 
 
 def imported_modules(statement):

@@ -12,9 +12,9 @@ from importlib.util import find_spec
 import re
 
 WITHOUT_KEY = {
-    'aiohttp', 'casadi', 'dask', 'distributed', 'ezdxf', 'flint', 'fmpy', 'jax',
+    'aiohttp', 'argcomplete', 'casadi', 'dask', 'distributed', 'ezdxf', 'flint', 'fmpy', 'jax',
     'matplotlib', 'mpmath', 'mujoco', 'numba', 'PIL', 'plotly', 'pyarrow', 'pylinkage',
-    'pythonfmu3', 'rich', 'rosbags', 'scipy', 'torch', 'yourdfpy', 'zstandard',
+    'pythonfmu3', 'rich', 'rosbags', 'ruamel', 'scipy', 'torch', 'yourdfpy', 'zstandard',
 }  # fmt: skip
 """Packages without a rosdep key, or too large for a robot, by the names of their imports."""
 
