@@ -34,6 +34,7 @@ import zstandard
 from .recorded import scene_file, SECOND
 from .test_replay import recorded
 from ..support.commands import environment
+from ..support.sampling import sample_count
 
 MEMORY = 3 * 2**29
 """What a process may take, its libraries too [bytes]."""
@@ -109,7 +110,7 @@ def test_qos_of_many_publishers_equals_that_of_the_first(tmp_path: Path) -> None
 
 def test_bag_of_65535_channels_is_refused_in_one_line(tmp_path: Path) -> None:
     channels(tmp_path / 'a.mcap', 65_535, '')
-    for command in ('info', 'report', 'plot', 'replay'):
+    for command in ('info', 'replay', 'plot', 'report')[: sample_count(4, 2)]:
         ended = told(tmp_path, command, 'a.mcap')
         assert ended.returncode == 2
         assert ended.stderr == (

@@ -197,6 +197,7 @@ def test_full_scenes_use_every_effect_drive_and_fault(recorded):
     assert (drives, faults) == ({'torque'}, set(FAULTS))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', SCENES)
 def test_runs_with_every_effect_replay_to_the_same_bytes(recorded, name):
     _, done = recorded(name)

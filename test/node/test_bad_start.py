@@ -62,6 +62,7 @@ def stderr_of(domain, tmp_path):
     return stderr_of
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', FILES)
 def test_bad_scene_file_is_reported_in_one_line(stderr_of, write_scene, tmp_path, kind):
     content, expected = FILES[kind]
@@ -74,6 +75,7 @@ def test_bad_scene_file_is_reported_in_one_line(stderr_of, write_scene, tmp_path
     assert str(scene) in line
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('kind', ARGUMENTS)
 def test_bad_node_argument_is_reported_in_one_line(stderr_of, kind):
     arguments, expected = ARGUMENTS[kind]

@@ -102,6 +102,7 @@ def test_rate_0_publishes_each_sample_with_its_stamp(graph, write_scene, start):
     assert node.end() == 0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('rate', [0, 100])
 def test_node_ignores_its_own_messages_on_a_shared_topic(graph, write_scene, start, rate):
     scene = write_scene(f'shared_{rate}', f'rate: {rate}\neffects: {{velocity: {{}}}}')

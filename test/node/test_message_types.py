@@ -100,6 +100,7 @@ sys.exit(main(['echo', '--count', '1', '--timeout', '1']))
 """The graph announces a type, as any participant can."""
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', ['this/msg/X', '', 'a/b/c/d', '../msg/X', 'std_srvs/srv/Empty'])
 def test_echo_imports_no_module_named_on_the_graph(name, domain):
     done = subprocess.run(

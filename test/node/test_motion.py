@@ -252,6 +252,7 @@ def run_program(domain):
     return run
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('name', 'text', 'package', 'imported'),
     [
@@ -278,6 +279,7 @@ sys.exit(run_linkage_node(Event(), [], {'scene': sys.argv[1]}, seconds=0.2))
 """
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('name', 'text', 'package', 'code', 'told'),
     [

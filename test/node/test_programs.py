@@ -43,6 +43,7 @@ def program(folder, name, *arguments, before=''):
     )
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', PROGRAMS)
 def test_help_lists_every_parameter_without_starting_a_node(tmp_path, name):
     answer = program(tmp_path, name, '--help', '--ros-args', '-p', 'rate:=3.0')
@@ -64,6 +65,7 @@ def test_programs_without_ros_name_what_to_install(tmp_path, name):
     assert answer.stderr.count('\n') == 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['crank_source', 'pd_controller'])
 def test_demo_node_warns_once_of_an_unknown_parameter(tmp_path, name):
     answer = program(tmp_path, name, *('--ros-args', '-p', 'secnds:=9.0', '-p', 'seconds:=0.1'))

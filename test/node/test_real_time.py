@@ -111,6 +111,7 @@ def test_missing_real_time_rights_are_reported_and_run_continues(graph, start, w
     assert node.end() == 0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('asked', ['[1000]', '[-2]', f'[{LAST}, 1000]', f'[{2**40}]'])
 def test_missing_processor_is_reported(graph, start, write_scene, asked):
     node = start(write_scene('processors', TURNING), '-p', f'cpu_affinity:={asked}')
@@ -125,6 +126,7 @@ def test_real_time_settings_are_off_by_default(graph, start, write_scene):
     assert locked(node.process) == 0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     'wrong', ['thread_priority:=100', 'thread_priority:=-1', 'cpu_affinity:=1', 'lock_memory:=1']
 )

@@ -68,6 +68,7 @@ def cannot_begin(folder, case):
     return folder / ('n' * 300), 'File name too long'
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('case', 'name'),
     [
@@ -133,6 +134,7 @@ def counts_in_info(bag, capsys):
     return counts, account['recording_failure']
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('kind', ['a full disk', 'a limit on file sizes'])
 def test_full_disk_counts_agree_in_log_diagnostics_and_bag(
     graph, request, tmp_path, write_scene, start, keeps_publishing, capsys, kind

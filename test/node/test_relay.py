@@ -24,6 +24,7 @@ from .test_programs import program
 KEYS = ('drive={topic: {joint: rocker_joint, branch: 1}}',)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ('name', 'joints', 'start'),
     [

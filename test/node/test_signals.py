@@ -81,6 +81,7 @@ def test_signal_at_a_random_moment_closes_the_bag(start, recorded, number, momen
     closed_bags(runs)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('number', SIGNALS)
 def test_signal_during_configuration_ends_with_code_0(start, recorded, number):
     scene, runs = recorded
@@ -91,6 +92,7 @@ def test_signal_during_configuration_ends_with_code_0(start, recorded, number):
     assert closed_bags(runs) == []
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('number', SIGNALS)
 def test_signal_during_a_run_closes_the_bag(graph, start, recorded, number):
     scene, runs = recorded

@@ -143,6 +143,7 @@ SCENES = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('text', SCENES)
 def test_node_survives_any_clock_message(graph, folder, write_scene, start, text):
     name = text.replace(' ', '_')

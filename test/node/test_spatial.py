@@ -62,6 +62,7 @@ MOTIONS = {
 """For each input its start and its rate."""
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('linkage', RODS)
 def test_rods_of_a_spatial_linkage_keep_their_lengths(
     graph, write_scene, start, folder, capsys, linkage

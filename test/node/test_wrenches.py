@@ -141,6 +141,7 @@ def test_wrench_topic_moves_the_crank_and_counts_nan(graph, folder, start, write
     assert all(each.recorded == each.tick.message for each in again)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['crank_commands', 'joint_states', 'diagnostics'])
 def test_wrench_topic_remapped_to_another_topic_is_refused(start, write_scene, name):
     scene = write_scene('clash', f'{SCENES["moved"]}{LOADS}', PENDULUM)
