@@ -137,7 +137,7 @@ def test_rates_at_a_toggle_are_left_out(linkage: Run) -> None:
 PNG = b'\x89PNG\r\n\x1a\n'
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', NAMES)
 def test_draw_draws_every_shipped_linkage(linkage: Run, tmp_path: Path, name: str) -> None:
     answer = linkage('draw', shipped(name), '--names')

@@ -180,6 +180,7 @@ def drawn(monkeypatch):
     return figures
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('over', ['crank', 'time'])
 def test_recorded_accelerations_are_drawn_below_the_rates(tmp_path, drawn, over):
     linkage = shipped_path('linkages/slider_crank.yaml').read_text()

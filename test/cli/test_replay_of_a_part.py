@@ -124,7 +124,7 @@ def test_replay_names_dropped_messages_beside_a_difference(tmp_path, capsys) -> 
 
 
 def test_replay_names_bytes_lost_by_recovery_beside_a_difference(tmp_path, capsys) -> None:
-    bag = recorded(tmp_path, f'effects: {{{NOISE}}}\n', 12_000)
+    bag = recorded(tmp_path, f'effects: {{{NOISE}}}\n', 6000)
     file = bag / 'bag_0.mcap'
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 1

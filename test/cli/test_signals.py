@@ -123,7 +123,7 @@ from linkage_ros.signals import stop_on_signals
 stop = stop_on_signals()
 signal.signal(signal.SIGALRM, signal.getsignal(signal.SIGINT))
 signal.setitimer(signal.ITIMER_REAL, 1e-3, 1e-3)
-end = time.monotonic() + 3.0
+end = time.monotonic() + 1.5
 while time.monotonic() < end:
     stop.wait(1e-6)
 signal.setitimer(signal.ITIMER_REAL, 0.0)

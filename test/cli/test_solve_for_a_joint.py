@@ -70,7 +70,7 @@ def test_solve_takes_as_many_joints_as_inputs(linkage: Run) -> None:
         assert position['left_elbow'] == pytest.approx(-1.2, abs=1e-14)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('name', 'joints'),
     [

@@ -118,6 +118,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return [write_files(tmp_path_factory.mktemp(kind), kind) for kind in FILES]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('command', TABLES)
 def test_tables_have_the_units_of_their_file(folders: list[Path], command: str) -> None:
     found = []

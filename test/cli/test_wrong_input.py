@@ -134,6 +134,7 @@ def without(
     )
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('typed', NEED_BAGS, ids=' '.join)
 def test_bag_commands_without_mcap_name_what_to_install(folder, typed) -> None:
     answer = without('mcap', folder, COMMAND, *typed)

@@ -202,7 +202,7 @@ def multiplier_motion(closure, start, times):
     return solve_ivp(slope, (0.0, times[-1]), begin, 'DOP853', times, rtol=1e-6, atol=1e-8).y
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', IN_SPACE)
 def test_claimed_spatial_step_error_equals_lagrange_multipliers(tmp_path, name):
     """The truth is of Lagrange multipliers in absolute coordinates, by DOP853."""
@@ -283,6 +283,7 @@ def samples_of(motion, joints, rate, phase, horizon):
     return found
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('carried', [True, False])
 def test_claimed_command_age_error_equals_sampled_runs(tmp_path, carried):
     (tmp_path / 'scene.yaml').write_text(

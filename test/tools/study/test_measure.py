@@ -81,7 +81,7 @@ def test_topic_scene_budget_has_sorted_knobs(tmp_path):
     scene = load_scene(tmp_path / 'scene.yaml')
     shares = []
     budget = measure_budget(
-        scene, like='sine', quick=True, parts=[ERRORS], horizon=2.0, progress=shares.append
+        scene, like='sine', quick=True, parts=[ERRORS], horizon=0.5, progress=shares.append
     )
     assert [knob.name for knob in budget.knobs] == [IN_USE, OF_COMMAND, 'solving']
     assert [each.partition(':')[0] for each in budget.left_out] == ['--quick']
