@@ -194,7 +194,7 @@ def test_five_bar_with_friction_rests_at_a_toggle():
 
 
 @pytest.mark.parametrize('name', ['five_bar', 'ankle', 'delta'])
-def test_friction_that_holds_leaves_the_least_acceleration_to_the_drives(name):
+def test_holding_friction_leaves_the_least_acceleration_to_drives(name):
     """By scipy's bounded least squares, in the metric of the kinetic energy."""
     closure, start = several(name)
     if name == 'five_bar':

@@ -268,7 +268,7 @@ def several_rubbing(name):
 
 
 @pytest.mark.parametrize('name', ['five_bar', 'ankle', 'delta'])
-def test_accelerations_of_several_inputs_are_those_whose_efforts_are_the_commands(name):
+def test_accelerations_of_several_inputs_take_the_commanded_efforts(name):
     closure, joints, loads, start = several_rubbing(name)
     mechanism, reactions = pressed(closure, joints, loads)
     count = len(start)
@@ -284,7 +284,7 @@ def test_accelerations_of_several_inputs_are_those_whose_efforts_are_the_command
 
 
 @pytest.mark.parametrize('name', ['five_bar', 'ankle', 'delta'])
-def test_several_inputs_at_rest_are_held_up_to_the_effort_that_moves_them(name):
+def test_friction_holds_several_inputs_up_to_its_effort(name):
     """At the start of a motion q̈ is 0, and each joint resists all that it can."""
     closure, joints, loads, start = several_rubbing(name)
     joints = {joint: replace(of, coulomb=0.0, breakaway=0.0) for joint, of in joints.items()}

@@ -290,7 +290,7 @@ def test_motors_that_bounce_in_their_play_keep_the_energy():
 
 
 @pytest.mark.parametrize('restitution', [0.0, 0.4])
-def test_blow_on_a_leaning_joint_equals_a_blow_on_a_wall(restitution):
+def test_leaning_joint_takes_a_blow_as_a_wall(restitution):
     closure, start = several('five_bar')
     mechanics = Mechanics(closure, Loads())
     stops = (-2.0, start[0]), FREE

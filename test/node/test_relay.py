@@ -145,7 +145,7 @@ def test_turning_back_joint_puts_no_effort_on_the_crank(relay):
     assert np.isnan(relay.turn_state(message).effort).all()
 
 
-def test_efforts_at_a_toggle_of_the_crank_are_not_sent():
+def test_efforts_at_a_crank_toggle_are_not_sent():
     closure = load('double_rocker')
     joint = closure.joint_names[-1]
     end = closure.input_ranges[0].highest

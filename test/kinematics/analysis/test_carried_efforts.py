@@ -92,7 +92,7 @@ PITCH, ROLL, ROLL_AT = (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, -0.018)
 @pytest.mark.sample(4)
 @pytest.mark.parametrize('motors', [(0.0, 0.0), (0.2, -0.1), (-0.35, 0.15), (0.3, 0.3)])
 @pytest.mark.parametrize('torques', [(1.0, 0.0), (2.0, -3.0), (-0.7, -0.9)])
-def test_two_motors_of_an_ankle_turn_it_by_the_forces_in_its_rods(motors, torques):
+def test_rod_forces_turn_an_ankle_as_its_motors(motors, torques):
     closure = load('ankle_motors')
     position = closure.position(*motors)
     pitch, roll = position['pitch'], position['roll']
@@ -186,7 +186,7 @@ def test_undetermined_efforts_are_left_out():
     assert closure.carry_efforts(closure.position(1.0), {'rocker_joint': float('nan')}) == ()
 
 
-def test_a_five_bar_with_a_stretched_arm_bears_any_force_along_it():
+def test_stretched_five_bar_arm_bears_any_force_along_it():
     # Crank and forearm in one line: a force along them has no lever on either crank.
     left = 1.2
     tip = 0.2 * np.array([cos(left), sin(left)])

@@ -67,7 +67,7 @@ def check(found, samples):
         assert (one.low, one.high) == pytest.approx((min(values), max(values)), abs=2e-3)
 
 
-def test_pitch_and_roll_of_an_ankle_within_the_limits_of_its_motors():
+def test_ankle_pitch_and_roll_within_its_motors_limits():
     found = reached(ANKLE)
     assert [one.joint for one in found] == ['pitch', 'roll']
     assert all(one.within == ('m1', 'm2') and one.closes for one in found)
@@ -99,7 +99,7 @@ def solve(start, one, other):
     return tuple(pose.tolist())
 
 
-def test_motors_of_an_ankle_within_the_limits_of_pitch_and_roll():
+def test_ankle_motors_within_the_limits_of_its_angles():
     text = ANKLE.replace(', limits: [-0.6, 0.6]', '')
     for name, limits in (('pitch', '[-0.3, 0.2]'), ('roll', '[-0.25, 0.35]')):
         line = next(line for line in text.splitlines() if line.startswith(f'  {name}:'))

@@ -291,7 +291,7 @@ def test_folding_linkage_follows_the_smooth_way(kind: str) -> None:
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize('kind', [*SPHERICAL, *RODS])
-def test_rates_at_change_points_are_those_of_the_smooth_way(kind: str) -> None:
+def test_rates_at_change_points_follow_the_smooth_way(kind: str) -> None:
     step = 1e-3
     for number in range(COUNT):
         made = draw(kind, number)

@@ -214,7 +214,7 @@ def test_torque_drive_refuses_unmovable_inputs(name):
     assert str(caught.value).startswith(line)
 
 
-def test_a_curve_of_friction_too_steep_for_the_step_is_refused():
+def test_friction_curve_too_steep_for_the_step_is_refused():
     drive, closure = TorqueDrive(inputs=START), closed('five_bar')
     steep = JointFriction(breakaway=50.0, stribeck=1e-4)
     line = r'effects\.friction\.joints\.P\.stribeck: the curve is too steep'

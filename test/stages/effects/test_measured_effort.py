@@ -49,7 +49,7 @@ def slopes(values, joints=('pitch', 'roll')):
     return np.array(columns).T
 
 
-def test_efforts_of_two_motors_are_published_at_pitch_and_roll():
+def test_motor_efforts_are_published_at_pitch_and_roll():
     scene = f'{BEGIN}effects: {{effort: {{measured: true, joints: [pitch, roll]}}}}'
     pipeline = pipeline_of(scene, ANKLE)
     motors, efforts = (0.2, -0.1), (1.5, -0.4)
@@ -60,7 +60,7 @@ def test_efforts_of_two_motors_are_published_at_pitch_and_roll():
     assert at_joints == pytest.approx(efforts, rel=1e-7)
 
 
-def test_efforts_at_pitch_and_roll_are_published_at_the_motors():
+def test_pitch_and_roll_efforts_are_published_at_motors():
     scene = 'drive: {topic: {joint: [pitch, roll], carry_forward: false}}\npublish_input: true\n'
     pipeline = pipeline_of(f'{scene}effects: {{effort: {{measured: true}}}}', ANKLE)
     there = load('ankle_motors').position(0.2, -0.1)

@@ -89,7 +89,7 @@ def test_rods_lie_between_the_balls_of_an_rssr():
         assert rocker == pytest.approx(np.array([rod[1], centre]), abs=1e-12)
 
 
-def test_a_leg_is_as_long_as_its_input_says_and_the_platform_is_whole():
+def test_legs_follow_their_inputs_and_the_platform_stays_whole():
     legs = 0.33, 0.34, 0.33, 0.35, 0.33, 0.34
     markers = markers_of('hexapod', *legs)
     (plate,) = (each for each in named(markers, 'links') if each.type == TRIANGLE_LIST)
@@ -136,7 +136,7 @@ def test_spatial_markers_draw_curves_and_trails_of_traced_points():
                                                else gone[-3:]), abs=1e-12)  # fmt: skip
 
 
-def test_arrows_show_the_forces_and_the_effort_that_are_published():
+def test_arrows_show_the_published_forces_and_effort():
     at_work = pipeline('pin_forces: {}, effort: {}, markers: {force_scale: 0.02}')
     for now in (BEGIN, BEGIN + 170 * MS):
         tick = at_work.tick(now)

@@ -31,7 +31,7 @@ def made(parameters, drawn=RSSR, seed='seed'):
     return parameters.alter(drawn, Random(seed))
 
 
-def test_an_rssr_of_parts_that_deviate_moves_by_their_own_lengths():
+def test_deviating_rssr_moves_by_its_own_lengths():
     off = {
         'crank.A': (3e-4, -2e-4, 1e-4),
         'crank.crank_joint': (0.0, 1e-4, -3e-4),
@@ -62,7 +62,7 @@ def test_an_rssr_of_parts_that_deviate_moves_by_their_own_lengths():
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('name', ['ankle', 'ankle_motors', 'delta', 'hexapod', 'wishbone'])
-def test_each_part_has_its_own_dimensions_and_the_inputs_are_those_of_the_pose(name):
+def test_deviating_parts_keep_the_inputs_of_the_pose(name):
     drawn = load(name).linkage
     holes = [hole for hole in drawn.holes if hole[1] in drawn.points]
     random = np.random.default_rng(7)
@@ -86,7 +86,7 @@ def test_each_part_has_its_own_dimensions_and_the_inputs_are_those_of_the_pose(n
     assert closure.residual(position) < 1e-10
 
 
-def test_draws_are_those_of_the_seed_and_scale_with_the_deviation():
+def test_draws_follow_the_seed_and_scale_with_deviation():
     one, again, other, double = (
         made(ToleranceEffect(by), seed=seed).points['B']
         for by, seed in ((1e-8, 'a'), (1e-8, 'a'), (1e-8, 'b'), (2e-8, 'a'))

@@ -137,7 +137,7 @@ def test_drag_moves_a_point_or_turns_the_camera(
 
 
 @pytest.mark.parametrize('width', [400, 1200])
-def test_each_input_has_a_slider_and_the_point_reads_three_coordinates(
+def test_inputs_have_sliders_and_points_show_three_coordinates(
     browser: Any, stills: Callable[[str], Path], width: int
 ) -> None:
     with shown(browser, stills('wishbone'), width=width) as page:
