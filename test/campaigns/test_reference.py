@@ -72,6 +72,7 @@ def test_condition_numbers_equal_exact_differences(family: str) -> None:
 CHAINS = ['RRR-RRR-RRR', 'any three', 'chain of needles', 'chain at a toggle']
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('family', CHAINS)
 def test_passed_results_change_joints_as_their_slopes_say(
     family: str, monkeypatch: pytest.MonkeyPatch

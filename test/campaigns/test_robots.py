@@ -41,6 +41,7 @@ def judged(name):
     return judge, closure.input_names, values
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', TYPED)
 def test_judge_agrees_with_the_closure(name):
     judge, held, values = judged(name)
@@ -48,6 +49,7 @@ def test_judge_agrees_with_the_closure(name):
     assert judge.difference(values, held) < 1e-13
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', TYPED)
 def test_judge_finds_a_joint_that_is_off(name):
     judge, held, values = judged(name)

@@ -74,6 +74,7 @@ def test_compile_asks_for_a_pose_where_no_loop_closes(linkage: Run, tmp_path: Pa
     assert said in refused(linkage, 'apart.yaml', '-o', 'a.c')
 
 
+@pytest.mark.sample(6)
 @pytest.mark.skipif(shutil.which('cc') is None, reason='needs cc')
 @pytest.mark.parametrize('odd', ODD)
 @pytest.mark.parametrize('ending', ['c', 'h', 'js', 'py', 'py --arrays'])

@@ -379,6 +379,7 @@ def test_gallery_prints_a_file_as_shipped(tmp_path: Path) -> None:
         assert answer.stdout == (CONFIG / f'{file}.yaml').read_text('utf-8')
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', scene_names())
 def test_copied_scene_loads_with_all_its_files(tmp_path: Path, name: str) -> None:
     answer = linkage(tmp_path, 'gallery', name, '--scene', '-o', 'mine.yaml')

@@ -35,6 +35,7 @@ def run(*typed: str) -> int:
     return command.run(parser.parse_args(typed), Event())
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('path', SCENES, ids=lambda path: path.stem)
 def test_scene_json_has_the_documented_keys(path, capsys):
     assert run(str(path), '--json') == 0

@@ -204,6 +204,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(('file', 'content', 'command'), ANSWERED)
 def test_check_mjcf_and_scene_answer_degenerate_linkages(
     linkage: Run, tmp_path: Path, file: str, content: str, command: str
@@ -243,6 +244,7 @@ LINKAGES = [
 ]
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('file', LINKAGES, ids=lambda file: file.stem)
 def test_nearly_coincident_points_are_solved_or_refused(file: Path) -> None:
     """A point of a link is put next to another one, by the least that a number can be."""

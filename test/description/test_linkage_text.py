@@ -54,6 +54,7 @@ def reads_as(linkage: Linkage, text: str) -> bool:
     return repr(read(text.encode())) == repr(linkage)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_gallery_linkage_text_equals_its_file(file):
     linkage = GALLERY[file.stem]
@@ -97,6 +98,7 @@ def spatial_linkage(text: str):
     return replace(linkage, corrections=PoseCorrections())
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', [*spatial_linkage_names(), 'every key'])
 def test_spatial_linkage_text_is_read_back_exactly(name):
     linkage = spatial_linkage(EVERY_KEY) if name == 'every key' else load(name).linkage

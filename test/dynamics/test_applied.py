@@ -192,6 +192,7 @@ def test_friction_holds_until_the_effort_exceeds_it():
 # On linkages.
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', STATES)
 def test_drive_effort_equals_the_virtual_work_of_loads(name):
     closure = closed(name)
@@ -251,6 +252,7 @@ def test_drive_effort_equals_the_virtual_work_of_loads(name):
             assert more[i] == pytest.approx(-work, rel=1e-6, abs=1e-6)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', [name for name in STATES if name != 'five_bar'])
 def test_compiled_load_terms_equal_the_interpreted_ones(name):
     closure = closed(name)

@@ -57,6 +57,7 @@ CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name', CASES)
 def test_chattering_step_stays_within_its_evaluation_bound(name):
     force, rate, inertia, restitution, play, step, method = CASES[name]

@@ -103,6 +103,7 @@ def test_holding_friction_reduces_the_effort_at_rest(angle):
         assert efforts == pytest.approx((expected,), abs=1e-12)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', [name for name in STATES if name != 'five_bar'])
 def test_compiled_friction_curve_equals_the_interpreted_one(name):
     closure = closed(name)

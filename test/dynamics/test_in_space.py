@@ -112,6 +112,7 @@ def motion_of(closure, inputs, rates, changes):
     return position, velocity, closure.acceleration(position, velocity, *changes)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', NAMES)
 def test_spatial_drive_efforts_equal_lagrange_multipliers(name):
     closure, spring = spring_of(weighed(name), 3.0)
@@ -229,6 +230,7 @@ def applied_by_hand(motion, closure, position, applied, wrenches, seconds):
         yield link, place, turn @ numbers[:3], turn @ numbers[3:]
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', NAMES)
 def test_spatial_loads_enter_the_drive_efforts(name):
     closure, random = weighed(name), Random(name)

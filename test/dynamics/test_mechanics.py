@@ -114,6 +114,7 @@ def test_parallelogram_inertia_is_constant():
         assert terms.half_slope == pytest.approx(0.0, abs=1e-16)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', ONE_INPUT)
 def test_term_slopes_equal_numerical_derivatives(name):
     closure = closed(name)
@@ -154,6 +155,7 @@ def lagrange(mechanics, q, rates, pulls):
     return matrix(q) @ np.array(pulls) + changed @ rates - bent + np.array(weights)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', STATES)
 def test_drive_efforts_equal_lagranges_equations(name):
     closure = closed(name)
@@ -167,6 +169,7 @@ def test_drive_efforts_equal_lagranges_equations(name):
         assert efforts == pytest.approx(lagrange(mechanics, q, rates, pulls), rel=1e-7, abs=1e-8)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', STATES)
 def test_drive_power_equals_energy_rate_plus_losses(name):
     # Power balance, with the rates in pins, sliders and dampers by differences of the position.

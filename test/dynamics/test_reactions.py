@@ -134,6 +134,7 @@ def test_scotch_yoke_reactions_equal_the_closed_form(angle):
     assert effort == pytest.approx(a * (-sine * pushed - cosine * dragged))
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', STATES)
 def test_reaction_effort_equals_the_energy_effort(name):
     closure = closed(name)

@@ -39,6 +39,7 @@ def assert_quarters(errors, moved):
     assert errors[-1] < 0.03 * moved
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', STATES)
 def test_joint_offsets_shift_joints_to_first_order(name):
     closure = closed(name)

@@ -171,6 +171,7 @@ def held(closure, frame):
     return mechanics, wrenches
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('frame', ['ground', 'link'])
 @pytest.mark.parametrize('name', STATES)
 def test_wrench_effort_equals_its_virtual_work(name, frame):
@@ -203,6 +204,7 @@ def test_wrench_effort_equals_its_virtual_work(name, frame):
             assert efforts[i] - without[i] == pytest.approx(-work, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('frame', ['ground', 'link'])
 @pytest.mark.parametrize('name', STATES)
 def test_pin_forces_balance_the_wrench_on_every_link(name, frame):
@@ -219,6 +221,7 @@ def test_pin_forces_balance_the_wrench_on_every_link(name, frame):
         )
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', [name for name in STATES if name != 'five_bar'])
 def test_compiled_wrench_terms_equal_the_interpreted_ones(name):
     closure = closed(name)

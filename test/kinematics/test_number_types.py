@@ -217,6 +217,7 @@ def zeros():
             yield name
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('name', zeros())
 def test_positive_and_negative_zero_give_the_same_bits(name):
     closure = lr.load(name)
@@ -301,6 +302,7 @@ def test_huge_rates_do_not_change_usual_rates_beside_them():
     assert not many.status.any()
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('name', MACHINES)
 @pytest.mark.parametrize('other', [nan, inf, -inf])
 def test_infinite_rates_do_not_change_huge_rates_beside_them(name, other):

@@ -102,6 +102,7 @@ def _pin_error(angle, link: float, ground: float) -> float:
     return UNIT_ROUNDOFF * (ANGLE * condition * link + 4.0 * (link + ground))
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name', FOUR_BARS)
 @pytest.mark.parametrize('side', [1, -1])
 def test_four_bar_rates_equal_the_textbook_loop_equation(name, side):

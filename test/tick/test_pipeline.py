@@ -284,6 +284,7 @@ def test_rejected_message_does_not_change_later_ticks():
 GALLERY = sorted((ROOT / 'config' / 'linkages').glob('*.yaml'))
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
 def test_gallery_joint_rates_equal_differences_of_angles(file):
     scene = pipeline(b'effects: {velocity: {}, acceleration: {}}', file.read_bytes())

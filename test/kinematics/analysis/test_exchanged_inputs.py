@@ -309,6 +309,7 @@ def test_compiled_inverse_equals_the_closure_near_a_pole():
         assert (status, joints) == (0, inverse.position(slide).joints), slide
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', LINKAGES)
 def test_compiled_inverse_equals_the_closure_at_cell_ends(name):
     """One of them is the middle of the branch. Beside a toggle numbers are bisected further."""

@@ -168,6 +168,7 @@ def test_compiled_random_linkages_equal_the_steps_bit_for_bit(family):
 SPECIAL = (0.0, -0.0, pi, -pi, 2 * pi, 0.5 * pi, -0.5 * pi, nextafter(pi, 4.0), 1e-300, 1e6, 1e300)
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('name', [path.stem for path in LINKAGES if path.stem not in ITERATED])
 def test_compiled_linkages_equal_the_steps_at_singular_inputs(name):
     closure = closure_of(name)

@@ -144,6 +144,7 @@ def test_c_code_omits_joints_and_derivatives_not_requested(derivatives, tmp_path
     assert short.count(' const ') < long.count(' const ')
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('odd', [nan, inf, -inf])
 @pytest.mark.parametrize('place', [0, 1, 2])
 def test_c_code_returns_indeterminate_for_values_not_finite(odd, place, tmp_path):

@@ -73,6 +73,7 @@ def test_unreachable_state_is_searched_only_once(monkeypatch, case):
     assert len(searches) == count
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('case', CASES)
 def test_forgotten_unreachable_states_give_the_same_gap_again(monkeypatch, case):
     monkeypatch.setattr('linkage_ros.kinematics.iterated.group._REMEMBERED', 2)

@@ -146,6 +146,7 @@ def sphere_grid(rng, count):
     return make, draw
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('count', [1, 2])
 @pytest.mark.parametrize('seed', range(12))
 def test_grid_cells_do_not_depend_on_earlier_queries(seed, count):
@@ -160,6 +161,7 @@ def test_grid_cells_do_not_depend_on_earlier_queries(seed, count):
         assert [found[inputs] for inputs in states] == fresh
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('seed', range(12))
 def test_grid_reach_does_not_depend_on_earlier_queries(seed):
     rng = random.Random(seed)

@@ -235,6 +235,7 @@ def inward(name: str) -> int:
     return -1 if LIMITS[name][1] == 'stretch' else 1
 
 
+@pytest.mark.sample(40)
 @pytest.mark.parametrize('name', LIMITS)
 @pytest.mark.parametrize('distance', DISTANCES)
 @pytest.mark.parametrize('side', [1, -1])

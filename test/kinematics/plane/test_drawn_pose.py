@@ -172,6 +172,7 @@ def test_rough_points_of_each_dyad_select_the_drawn_assembly(seed, dyads):
     assert is_as_drawn(closure, drawn)
 
 
+@pytest.mark.sample(40)
 @pytest.mark.parametrize(('seed', 'dyads'), RANDOM)
 def test_rough_link_angles_select_the_drawn_assembly(seed, dyads):
     drawn = drawing(seed, dyads)
@@ -183,6 +184,7 @@ def test_rough_link_angles_select_the_drawn_assembly(seed, dyads):
     assert is_as_drawn(posed(drawn, {}, rough), drawn)
 
 
+@pytest.mark.sample(30)
 @pytest.mark.parametrize(('seed', 'dyads'), RANDOM)
 def test_too_few_points_are_refused_with_a_remedy(seed, dyads):
     drawn = drawing(seed, dyads)

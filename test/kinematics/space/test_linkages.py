@@ -105,6 +105,7 @@ def test_drawn_pose_is_solved_at_its_inputs(name):
         assert quaternion == pytest.approx((0.0, 0.0, 0.0, 1.0), abs=1e-14), link
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', NAMES)
 def test_rates_and_accelerations_equal_numerical_derivatives(name):
     closure, step = shared_closure(name), 1e-4
@@ -135,6 +136,7 @@ def _differences(values, step):
     return (after - before) / (2.0 * step), (after - 2.0 * now + before) / step**2
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', NAMES)
 def test_spatial_links_keep_their_lengths_and_axes(name):
     closure = shared_closure(name)
@@ -422,6 +424,7 @@ input: [s]
 """
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('beside', [0.0, 0.5])
 @pytest.mark.parametrize('turned_round', [False, True])
 @pytest.mark.parametrize('value', [0.25, 0.4, 0.5, 0.75])

@@ -61,6 +61,7 @@ def test_dropout_loses_the_declared_share(probability, burst):
         assert lost == pytest.approx(probability, abs=1 / N)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(('probability', 'burst'), CHAINS)
 @pytest.mark.parametrize('state', [True, False], ids=['lost', 'arriving'])
 def test_dropout_bursts_have_the_declared_lengths(probability, burst, state):

@@ -52,6 +52,7 @@ def test_tolerance_changes_only_the_points():
         )
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
 def test_zero_tolerance_keeps_the_drawn_linkage(file):
     drawn = linkage_of(file.read_bytes())

@@ -61,6 +61,7 @@ def every_candidate(problem, seed, count):
     return [DesignFound(score, candidate) for score, _, _, candidate in sorted(found)]
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('count', [0, 1, CHUNK - 1, CHUNK, CHUNK + 1, CAST])
 @pytest.mark.parametrize('keep', [1, 100, 10 * CHUNK])
 def test_search_keeps_the_best_in_score_order(count, keep):

@@ -52,6 +52,7 @@ WRITTEN_OUT = [
 """Linkages whose files have points, from which distances are known; the others have lengths."""
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', WRITTEN_OUT)
 def test_dxf_part_of_every_link_has_its_pin_holes(name: str, tmp_path: Path) -> None:
     document = read(links_dxf(load(name)), tmp_path)

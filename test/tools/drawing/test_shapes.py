@@ -97,6 +97,7 @@ def test_rounded_outline_keeps_its_distance(points, radius):
         assert min(abs(place - corner) for corner in corners) == pytest.approx(radius)
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_every_pin_is_drawn_as_a_circle(file):
     closure, points, found = drawn(file.stem)
@@ -111,6 +112,7 @@ def test_every_pin_is_drawn_as_a_circle(file):
             assert abs(circles[point] - place) < 1e-12
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_every_link_is_drawn_around_its_points(file):
     closure, points, found = drawn(file.stem)

@@ -47,6 +47,7 @@ def numbers(element, key):
     return [float(part) for part in element.get(key).split()]
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize('name', CASES)
 def test_written_urdf_is_valid(name):
     """As check_urdf has it, and what robot_state_publisher warns of."""
@@ -307,6 +308,7 @@ def differences(one, other):
                 yield abs(remainder(off, tau)) if turns else abs(off) / size_of(one)
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('name', [*ONE_INPUT, 'five_bar'])
 def test_gallery_linkage_survives_the_urdf_round_trip(name):
     closure = load(LINKAGES / f'{name}.yaml')
@@ -324,6 +326,7 @@ def test_gallery_linkage_survives_the_urdf_round_trip(name):
         assert again.linkage.masses[link].inertia == pytest.approx(mass.inertia, rel=1e-15)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', ODD)
 def test_odd_frames_survive_the_urdf_round_trip(name):
     closure = closure_of(name)

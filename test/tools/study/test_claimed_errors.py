@@ -304,6 +304,7 @@ def test_claimed_command_age_error_equals_sampled_runs(tmp_path, carried):
     assert rms / 1.5 <= claimed.rms <= 1.5 * rms
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ('name', 'rate'),
     [

@@ -75,6 +75,7 @@ def coefficient(truth: Any, joint: int, order: int, unit: float) -> mpf:
         return value * (1, 1, 2)[order] * unit
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('family', [*RANDOM, *ADVERSARIAL])
 def test_interval_enclosures_contain_the_power_series_solutions(family):
     """By dyads and power series, and by the constraints: they share the linkage alone."""
@@ -118,6 +119,7 @@ LOOPS = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('loop', LOOPS)
 def test_interval_enclosures_contain_the_reference_loops(loop):
     make_mechanism, count, solve_loop, cases = LOOPS[loop]
@@ -176,6 +178,7 @@ def test_interval_enclosure_follows_a_parallelogram_near_change_points(distance)
         assert apart(follower, value, turning=False) < 1e-40
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     'name',
     ['class_3', 'five_bar', 'excavator_bucket', 'whitworth_quick_return', *IN_SPACE],

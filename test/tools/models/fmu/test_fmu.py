@@ -369,6 +369,7 @@ def test_fmu_step_of_several_periods_makes_several_ticks(bench):
     assert other.step(3.004, 0.002) == expected
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ('time', 'seconds'),
     [(0.001, 0.0015), (0.001, 0.0004), (0.001, nan), (0.001, 1e9), (0.002, 0.001), (0.0, 0.001)],
