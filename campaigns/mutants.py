@@ -69,7 +69,7 @@ TESTS: dict[str, Sequence[str]] = {
     'kinematics/space/plan': ('kinematics/space',),
     'kinematics/space/steps': ('kinematics/space',),
     'dynamics/motion': ('dynamics/test_motion.py', *DYNAMICS),
-    'dynamics/mechanics': DYNAMICS,
+    'dynamics/equation': DYNAMICS,
     'dynamics/reactions': ('dynamics/test_reactions.py', *DYNAMICS),
     'stages/drives/topic': ('stages/drives', 'tick/test_pipeline.py'),
     'stages/drives/torque': ('stages/drives', 'dynamics'),

@@ -30,6 +30,7 @@ def test_each_mutant_differs_in_one_expression_and_parses(module):
 
 
 def test_files_of_each_mutated_module_exist():
+    assert [module for module in TESTS if not file_of(module).is_file()] == []
     assert all((ROOT / 'test' / name).exists() for tests in TESTS.values() for name in tests)
 
 
