@@ -8,13 +8,14 @@
 
 """Dyads on a crank: as exact as lengths and angle allow, at every scale."""
 
+from fractions import Fraction
 import math
-from math import cos, hypot, ldexp, pi, remainder, sin, tau
+from math import cos, hypot, inf, ldexp, nextafter, pi, remainder, sin, tau
 
 from hypothesis import assume, given, settings, strategies as st
 from linkage_ros.description import parse_yaml, read_linkage, scene_text_for
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics import Closure, InputSweep, Status
+from linkage_ros.kinematics import Closure, crank_diagonal, InputSweep, Status
 import pytest
 
 from ..linkages import (
@@ -381,6 +382,15 @@ def test_crank_angle_of_a_million_radians_is_reduced_exactly():
     assert far.poses[0].second - near.poses[0].second == pytest.approx(
         2 * pi * round((far.poses[0].second - near.poses[0].second) / (2 * pi)), abs=1e-9
     )
+
+
+@given(a=length, d=length, decades=st.integers(-9, 9))
+def test_diagonal_root_is_correctly_rounded(a, d, decades):
+    """2·√(ad) lies within half a unit in the last place of what it is rounded to, as fractions."""
+    a *= 10.0**decades
+    root = crank_diagonal(a, a + d, a + d, d).root
+    below, above = ((Fraction(root) + Fraction(nextafter(root, to))) / 2 for to in (0.0, inf))
+    assert below**2 <= 4 * Fraction(a) * Fraction(d) <= above**2
 
 
 def check_four_bar(lengths: tuple[float, ...], phi: float, side: int, rate_limit: float) -> bool:
