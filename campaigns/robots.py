@@ -54,8 +54,8 @@ _DIGITS, _ROUNDS, _MET = 40, 8, 1e-25
 _STEP, _RANK = 1e-6, 1e-7
 """Step of its slopes, in [rad] and [m], and singular values that are rounding."""
 
-_TRIED = 12
-"""So many sets of joints are tried as inputs."""
+_TRIED, _DRAWN = 12, 100
+"""So many sets of joints are tried as inputs, of so many drawn ones."""
 
 _WRONG = 1e-5
 """Largest difference of a joint that CAD's rounding of redundant equations explains."""
@@ -138,9 +138,9 @@ equations than needed, their rounding by CAD decides its last digits: the judge 
 squares, the closure those that it needs.
 
 *Back* gives as many joints as there are inputs, and finds the inputs; or it says why it cannot.
-{_TRIED} sets of joints that tell the inputs in the pose are tried. *Check* is the processor time
-of the command, with the search for the pose; *a state* that of one position, the mean of all,
-most of them where none was solved before.
+At most {_TRIED} sets of joints that tell the inputs in the pose are tried. *Check* is the
+processor time of the command, with the search for the pose; *a state* that of one position, the
+mean of all, most of them where none was solved before.
 """,
 )
 
@@ -378,8 +378,8 @@ def _drive_by_joints(closure: Any, draw: np.random.Generator) -> tuple[Any, str]
     """
     Return the closure with as many joints as inputs, or None and why there is none.
 
-    First come the joints that tell the inputs best, by a factorization with pivots, then those
-    among random halves of all: a rod's spin tells of inputs that it does not drive.
+    Of the first joints of the file, and then of random ones, those are tried that tell the inputs
+    best, by a factorization with pivots: a rod's spin tells of inputs that it does not drive.
     """
     slopes = np.array(closure.jacobian(closure.close_unlimited(*closure.linkage.pose.inputs)))
     rows = [k for k, name in enumerate(closure.joint_names) if name not in closure.input_names]
@@ -387,14 +387,19 @@ def _drive_by_joints(closure: Any, draw: np.random.Generator) -> tuple[Any, str]
     wanted = len(closure.input_names)
     if rank < wanted:
         return None, f'joints tell {rank} of {wanted} inputs'
-    for number in range(_TRIED):
-        among = draw.permutation(rows)[: max(wanted, len(rows) // 2)] if number else rows
+    parts = [rows[:size] for size in range(wanted, len(rows) + 1)]
+    parts += [draw.permutation(rows)[: wanted + 2].tolist() for _ in range(_DRAWN)]
+    tried = set[frozenset[int]]()
+    for among in parts:
         _, least, order = qr(slopes[among].T, pivoting=True)
-        if abs(least[wanted - 1, wanted - 1]) > _RANK:
+        chosen = frozenset(among[k] for k in order[:wanted])
+        if abs(least[wanted - 1, wanted - 1]) > _RANK and chosen not in tried:
+            tried.add(chosen)
             with suppress(DefinitionError):
-                names = (closure.joint_names[among[k]] for k in order[:wanted])
-                return closure.driven_by(*names), ''
-    return None, f'none of {_TRIED} sets drives all'
+                return closure.driven_by(*(closure.joint_names[k] for k in sorted(chosen))), ''
+        if len(tried) == _TRIED:
+            break
+    return None, f'none of {len(tried)} sets drives all'
 
 
 def _check(robot: Robot) -> float:
