@@ -8,7 +8,7 @@
 
 """``python -m linkage_ros`` is ``linkage``, also where no script of that name is installed."""
 
-import linkage_ros.early_signals  # noqa: F401 (before all other imports)
+import linkage_ros.before_imports  # noqa: F401 (before all other imports)
 from linkage_ros.signals import end_at_signals
 
 

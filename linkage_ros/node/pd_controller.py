@@ -13,7 +13,7 @@ from __future__ import annotations
 from importlib import import_module
 import sys
 
-import linkage_ros.early_signals  # noqa: F401 (before all other imports)
+import linkage_ros.before_imports  # noqa: F401 (before all other imports)
 from linkage_ros.errors import LinkageError, missing_packages_reported
 from linkage_ros.signals import stop_on_signals
 

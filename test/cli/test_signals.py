@@ -341,7 +341,7 @@ STARTS = """
 import os, signal, sys
 class Interrupts:
     left = int(sys.argv.pop(1))
-    first = 'linkage_ros.early_signals'
+    first = 'linkage_ros.before_imports'
     def find_spec(self, name, path=None, target=None):
         self.left -= self.first in sys.modules and name != self.first
         if self.left == 0:

@@ -32,7 +32,7 @@ HEIGHTS = (
         'signals',
         'generated_code',
         'progress',
-        'early_signals',
+        'before_imports',
         'dask_workers',
         'workbench',
         'domains',
