@@ -78,7 +78,7 @@ class NearCrossing(Sphere):
 
     @property
     def start(self):
-        """The root of smaller size at x = 0; the one beyond the gap looks as its continuation."""
+        """Return the smaller root at x = 0; the one beyond the gap looks as its continuation."""
         return -0.5 * self.centre + sqrt(0.25 * self.centre**2 - self.half_gap**2)
 
     def matrix(self, inputs, z):
