@@ -378,8 +378,9 @@ def _drive_by_joints(closure: Any, draw: np.random.Generator) -> tuple[Any, str]
     """
     Return the closure with as many joints as inputs, or None and why there is none.
 
-    Of the first joints of the file, and then of random ones, those are tried that tell the inputs
-    best, by a factorization with pivots: a rod's spin tells of inputs that it does not drive.
+    Of the first joints of the file, and of random ones, those are found that tell the inputs best,
+    by a factorization with pivots. The best such sets are tried: a rod's spin tells of inputs that
+    it does not drive.
     """
     slopes = np.array(closure.jacobian(closure.close_unlimited(*closure.linkage.pose.inputs)))
     rows = [k for k, name in enumerate(closure.joint_names) if name not in closure.input_names]
@@ -389,16 +390,15 @@ def _drive_by_joints(closure: Any, draw: np.random.Generator) -> tuple[Any, str]
         return None, f'joints tell {rank} of {wanted} inputs'
     parts = [rows[:size] for size in range(wanted, len(rows) + 1)]
     parts += [draw.permutation(rows)[: wanted + 2].tolist() for _ in range(_DRAWN)]
-    tried = set[frozenset[int]]()
+    fitness: dict[frozenset[int], float] = {}
     for among in parts:
         _, least, order = qr(slopes[among].T, pivoting=True)
-        chosen = frozenset(among[k] for k in order[:wanted])
-        if abs(least[wanted - 1, wanted - 1]) > _RANK and chosen not in tried:
-            tried.add(chosen)
+        fitness[frozenset(among[k] for k in order[:wanted])] = abs(least[wanted - 1, wanted - 1])
+    tried = sorted(fitness, key=fitness.__getitem__, reverse=True)[:_TRIED]
+    for chosen in tried:
+        if fitness[chosen] > _RANK:
             with suppress(DefinitionError):
                 return closure.driven_by(*(closure.joint_names[k] for k in sorted(chosen))), ''
-        if len(tried) == _TRIED:
-            break
     return None, f'none of {len(tried)} sets drives all'
 
 
