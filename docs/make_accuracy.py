@@ -170,7 +170,7 @@ def _section(shown: Shown, budget: Budget, picture: str, *, quick: bool) -> Iter
     yield ''
     yield from (f'> {escaped(line)}<br>' for line in lead_lines(budget))
     yield ''
-    yield f'![Error against cost of {shown.scene}](accuracy/{picture})'
+    yield f'![Error against cost of {Path(shown.scene).stem}](accuracy/{picture})'
     yield ''
     made = budget_table(budget).as_texts()
     yield from table(made.heads, made.rows)
