@@ -16,7 +16,16 @@ from itertools import pairwise
 from math import cos, exp, inf, isfinite, pi, sin, sqrt
 
 from hypothesis import example, given, strategies as st
-from linkage_ros.dynamics import LARGEST, LawTerm, METHODS, SingleDofMechanism, Terms, TorqueTable
+from linkage_ros.dynamics import (
+    LARGEST,
+    LawTerm,
+    METHODS,
+    SeveralDofMechanism,
+    SingleDofMechanism,
+    Terms,
+    TorqueTable,
+)
+from linkage_ros.dynamics.equation import InputLawTerm, InputTerms
 import numpy as np
 import pytest
 
@@ -353,8 +362,19 @@ def test_step_across_rows_of_several_tables_is_exact(loads):
     )  # fmt: skip
     motion = mass.advance(mass.state_at(0.0, 0.0), 0.1, 0.0)
     each = [(lever, *rising(sorted(rows), 0.1)) for lever, rows in loads]
-    assert motion.rate == pytest.approx(sum(x * rate for x, rate, _ in each), abs=1e-11)
-    assert motion.value == pytest.approx(sum(x * way for x, _, way in each), abs=1e-12)
+    rate, way = (sum(x * part[n] for x, *part in each) for n in range(2))
+    assert motion.rate == pytest.approx(rate, abs=1e-11)
+    assert motion.value == pytest.approx(way, abs=1e-12)
+    # Two inputs alike, which the loads move in opposite directions.
+    terms = InputTerms(
+        (1.0, 0.0, 1.0), ((1.0, 0.0), (0.0, 1.0)), (0.0, 0.0),
+        tuple(InputLawTerm((lever, -2.0 * lever), 0.0, 0.0) for lever, _ in loads),
+    )  # fmt: skip
+    free = ((-inf, inf),) * 2
+    masses = SeveralDofMechanism(lambda *_: terms, STEP['rk4'], free, laws=tuple(tables))
+    moved = masses.advance(masses.state_at((0.0, 0.0), (0.0, 0.0)), 0.1, (0.0, 0.0))
+    assert moved.rate == pytest.approx((rate, -2.0 * rate), abs=1e-11)
+    assert moved.value == pytest.approx((way, -2.0 * way), abs=1e-12)
 
 
 def test_step_across_many_table_rows_has_bounded_cost():

@@ -106,6 +106,7 @@ FACES = {
 BY_PATH = ('linkage_ros.cli.main', 'linkage_ros.stages.drives.')
 # Tests of what lies within, by their file.
 WITHIN = {
+    'linkage_ros.dynamics.equation',
     'linkage_ros.kinematics.iterated.grid',
     'linkage_ros.kinematics.iterated.group',
     'linkage_ros.kinematics.analysis.monotonic_pieces',
