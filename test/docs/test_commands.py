@@ -44,7 +44,6 @@ NOT_RUN = {
     'needs PlotJuggler': 1,
     'needs RViz': 1,
     'needs a ROS installation with ros2_control': 1,
-    'needs a checkout of the robots': 1,
     'needs a ROS installation': 19,
     'needs a second machine': 3,
     "needs bloom, rosdep's lists and Debian's tools": 1,
