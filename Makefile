@@ -135,7 +135,8 @@ demo: $(DEMO)
 PYTEST := $(BIN)/python -m pytest --durations 25
 tests = $(PYTEST) -o cache_dir=build/pytest_$(1) $(2)
 node_tests = { $(call tests,$(1),$(2)) || { [ $$? = 1 ] && [ -n '$(RUN_AGAIN)' ]; }; }
-BY_FILE := --dist loadfile --no-loadscope-reorder
+# After a crash the other worker goes on: with a new one, xdist 3.8 would wait for ever.
+BY_FILE := --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 marked = $$(grep -rl --include='test_*.py' 'mark\.$(1)' test)
 test: $(STAMP)
 	@status=0; rm -rf build/pytest_*; \

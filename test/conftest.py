@@ -22,6 +22,7 @@ from linkage_ros.cli import terminal
 import pytest
 
 from .browser import chromium
+from .support.crashed_workers import pytest_handlecrashitem  # noqa: F401 (a hook)
 from .support.missing_packages import missing_package
 from .support.sampling import choose_covering, EXAMPLES, TAKES_ALL
 

@@ -12,6 +12,7 @@ Run tests that failed again, one at a time, and list them.
 `make test` runs this file last, with the caches of its parts. On a busy machine a test that starts
 nodes may wait in vain, so of the parts in `WITH_NODES` the second outcome counts. Any other test
 that failed once fails the run, which that part has said already: what it tests depends on chance.
+Where a worker crashed, its whole file runs again, since the tests after the crash did not run.
 """
 
 import json
@@ -25,7 +26,11 @@ WITH_NODES = {'pytest_nodes', 'pytest_alone'}
 
 def failed_in(cache: Path) -> list[str]:
     """Return the tests that failed when this cache was last used."""
-    file = cache / 'v' / 'cache' / 'lastfailed'
+    return _read(cache, 'cache/lastfailed')
+
+
+def _read(cache: Path, key: str) -> list[str]:
+    file = cache / 'v' / key
     return [*json.loads(file.read_text('utf-8'))] if file.exists() else []
 
 
@@ -38,8 +43,11 @@ def main(caches: list[Path]) -> int:
         if not first:
             continue
         print('make: tests that failed beside others run again, one at a time', flush=True)
-        run = ['-m', 'pytest', '-o', f'cache_dir={cache}', '--last-failed']
-        ran = subprocess.run([sys.executable, *run, '--durations', '25'], check=False).returncode
+        # `CRASHED` of test/support/crashed_workers.py.
+        files = dict.fromkeys(_read(cache, 'linkage_ros/crashed'))
+        chosen = [*files, *(test for test in first if test.partition('::')[0] not in files)]
+        run = ['-m', 'pytest', '-o', f'cache_dir={cache}', '--durations', '25', *chosen]
+        ran = subprocess.run([sys.executable, *run], check=False).returncode
         second = failed_in(cache) if ran <= 1 else first
         for test in first:
             passed = 'failed again' if test in second else 'passes alone'

@@ -59,6 +59,38 @@ def test_tests_that_failed_once_are_listed(tmp_path: Path, part: str, bad: bool)
     assert answer.returncode == int(bad or part == 'rest')
 
 
+CRASH = """
+import os
+from pathlib import Path
+import pytest
+
+@pytest.mark.parametrize('number', range(4))
+def test_it(number):
+    been = Path('been')
+    with been.open('a') as file:
+        file.write(f'{number}')
+    if been.read_text() == '01':
+        os.abort()
+"""
+
+
+def test_file_whose_worker_crashed_runs_again_as_a_whole(tmp_path: Path) -> None:
+    """The two tests after the crash have not run before; a new worker would wait for ever."""
+    pytest.importorskip('xdist')
+    (tmp_path / 'test_crash.py').write_text(CRASH)
+    (tmp_path / 'test_good.py').write_text('def test_good(): pass\n')
+    (tmp_path / 'pytest.ini').write_text('[pytest]\n')
+    hook = Path(__file__).parents[1] / 'support' / 'crashed_workers.py'
+    (tmp_path / 'conftest.py').write_text(hook.read_text('utf-8'))
+    cache = 'build/pytest_nodes'
+    by_file = ('-p', 'xdist', '-n', '2', '--dist', 'loadfile', '--max-worker-restart', '0')
+    first = run(tmp_path, '-m', 'pytest', '-o', f'cache_dir={cache}', *by_file)
+    assert (first.returncode, (tmp_path / 'been').read_text()) == (1, '01')
+    answer = run(tmp_path, str(RUN_AGAIN), cache)
+    assert answer.stdout.endswith('  test_crash.py::test_it[1]: passes alone\n')
+    assert (answer.returncode, (tmp_path / 'been').read_text()) == (0, '010123')
+
+
 def test_run_again_without_failures_prints_nothing(tmp_path: Path) -> None:
     (tmp_path / 'test_it.py').write_text('def test_good(): pass\n')
     run(tmp_path, '-m', 'pytest', '-q', '-o', 'cache_dir=build/pytest_rest')
