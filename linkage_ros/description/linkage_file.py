@@ -153,16 +153,16 @@ def read_any_closure(
     With ``publish_model_joints`` a robot, or a spatial file, publishes joints that place every
     link, as a robot model needs them.
     """
+    if is_planar_file(content):
+        return read_closure(content, name, publish_inputs=publish_inputs)
     if 'urdf' in content:
         from linkage_ros.description.robot_file import (
             read_robot_closure as read,  # local import: few linkages are robots
         )
-    elif 'points' in content:
+    else:
         from linkage_ros.description.space_file import (
             read_space_closure as read,  # local import: a planar file does without space
         )
-    else:
-        return read_closure(content, name, publish_inputs=publish_inputs)
     return read(
         content, name, publish_inputs=publish_inputs, publish_model_joints=publish_model_joints
     )

@@ -139,10 +139,10 @@ class Closure:
         """Make a closure of the kind that the linkage needs."""
         kinds: tuple[type[Closure], ...] = (cls,)
         if cls is Closure:
-            from linkage_ros import Linkage, PlanarClosure  # local import: it is a closure
+            from linkage_ros import PlanarClosure  # local import: it is a closure
 
             kinds = (PlanarClosure,)
-            if not isinstance(linkage, Linkage):
+            if not isinstance(linkage, PlanarClosure.takes):
                 from linkage_ros import SpaceClosure  # local import: in space only
 
                 kinds = PlanarClosure, SpaceClosure
