@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import chain, islice, product
-from math import copysign, inf, isfinite, isinf, ldexp, prod, tau
+from math import copysign, inf, isfinite, isinf, ldexp, prod, sqrt, tau
 from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.generated_code import define_function
@@ -559,11 +559,21 @@ class Grid:
 def _predict_along(
     unknowns: Sequence[float], forms: LineForms, length: float, part: float
 ) -> Sequence[float]:
-    """Return the unknowns at a part of a length on a straight line."""
-    off = part * length
+    """
+    Return the unknowns at a part of a length on a straight line.
+
+    Next to a toggle they go as the root of the way that is left to it, which slope and bend tell:
+    along a root longer steps are proven than along a parabola.
+    """
+    (slopes, bends), off = forms, part * length
+    bending = 4.0 * sum(slope * bend for slope, bend in zip(slopes, bends, strict=True))
+    left = sum(slope * slope for slope in slopes) / bending if bending > 0.0 else inf
+    if not left > off:
+        left = inf
+    along = 2.0 * off / (1.0 + sqrt(1.0 - off / left))
     return [
-        value + off * (slope + off * bend)
-        for value, slope, bend in zip(unknowns, *forms, strict=True)
+        value + along * slope + off * off * (bend - 0.25 * slope / left)
+        for value, slope, bend in zip(unknowns, slopes, bends, strict=True)
     ]
 
 
