@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.iterated.grid import Grid
     from numpy.typing import ArrayLike
 
-_FILLED = 2
-"""Most inputs of a grid whose cells within limits are made before the first state."""
+_FILLED = 4096
+"""Most cells of a grid that are made before the first state."""
 
 Own = TypeVar('Own', bound='Closure')
 
@@ -523,8 +523,8 @@ class Closure:
                 if (compiled.derivatives, compiled.wanted) == (derivatives, wanted):
                     return compiled
             for grid in self.grids:
-                if len(grid.home) <= _FILLED:
-                    grid.fill()
+                if grid.is_filled_at_once:
+                    grid.fill(_FILLED)
             compiled = linkage.Compiled(self, derivatives, wanted, given_count=given_count)
             self._compiled.append(compiled)
             return compiled
@@ -682,7 +682,7 @@ class Closure:
     @property
     def makes_cells_in_motion(self) -> bool:
         """Whether some cells are made only where a motion leads."""
-        return any(len(grid.home) > _FILLED for grid in self.grids)
+        return not all(grid.is_filled_at_once for grid in self.grids)
 
     def make_cells_ahead(self, inputs: Sequence[float], rates: Sequence[float]) -> None:
         """Make the cells that inputs at these rates meet next, in [rad] or [m] and per second."""

@@ -26,7 +26,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import chain, islice, product
-from math import copysign, inf, isfinite, isinf, ldexp, prod, sqrt, tau
+from math import copysign, inf, isfinite, isinf, ldexp, pi, sqrt, tau
+from operator import contains
 from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.generated_code import define_function
@@ -48,8 +49,11 @@ _LEVELS = 5
 _KEPT = 2**20
 """Most numbers of cells that are kept: any other is made again, to the same bits."""
 
-_FILLED = 4096
-"""Most cells that are made at once."""
+_AT_ONCE = 2
+"""Most inputs whose cells within limits are made before the first state."""
+
+_TRIED = 2
+"""So many times the most cells are tried, to make all: next to a singularity few are proven."""
 
 _WAYS = 2**15
 """Most cells of which it is kept what leads on from them."""
@@ -194,7 +198,8 @@ class Grid:
         self._given = GridCell(self.home, tuple(unknowns), (level,) * count, bends)
         self._kept: dict[Key, _Found] = {}
         self._ways: dict[Key, _Found] = {}
-        self._most_kept = _KEPT // len(self._given.numbers)
+        self.most_cells = _KEPT // len(self._given.numbers)
+        """Most cells that are kept."""
         self.widths = [ldexp(_WIDTH, -halvings - level) for level in range(_LEVELS)]
         self._look_up = self._write_look_up()
         self._corners: list[tuple[float, ...]] = list(product((-0.5, 0.5), repeat=count))
@@ -337,36 +342,60 @@ class Grid:
             found.append(gained if returns and not left else None)
         return found
 
-    def fill(self) -> dict[Key, tuple[float, ...]] | None:
+    @property
+    def is_filled_at_once(self) -> bool:
+        """Whether the cells are so few that all are made before the first state."""
+        bounded = all(isfinite(given.low) and isfinite(given.high) for given in self._inputs)
+        return bounded and len(self._inputs) <= _AT_ONCE
+
+    def fill(self, most: int) -> dict[Key, tuple[float, ...]] | None:
         """
         Make all cells within the limits of the inputs; return their numbers by level and place.
 
-        None where an input has no limits, or where these are too many.
+        None where these are more than ``most``. An input that returns needs no more than a turn.
         """
-        cells: dict[Key, tuple[float, ...]] = {}
-        limits = [(given.low, given.high) for given in self._inputs]
-        if not all(map(isfinite, chain(*limits))):
-            return None
-        waiting = [(0, self._keys_between(0, limits))]
+        limits, cells = [*self._limits_to_fill()], dict[Key, tuple[float, ...]]()
+        tried: dict[Key, bool] = {}
+
+        def make(key: Key) -> bool:
+            """Make a cell, or the narrower ones in it; return whether any is proven."""
+            if key in tried or len(cells) > most or len(tried) > _TRIED * most:
+                return tried.get(key, False)
+            with BUILD_LOCK:
+                numbers = self._follow(key).numbers
+            tried[key] = numbers is not None
+            if numbers is not None:
+                cells[key] = numbers
+            elif key[0] + 1 < _LEVELS:
+                halves = list(map(make, self._halve(key, limits)))
+                tried[key] = any(halves)
+            return tried[key]
+
+        ranges, waiting = self._keys_between(0, limits), {(0,) * len(self.home)}
         while waiting:
-            level, keys = waiting.pop()
-            if len(cells) + prod(map(len, keys)) > _FILLED:
-                return None
-            for key in product((level,), *keys):
-                if key in cells:
-                    continue
-                with BUILD_LOCK:
-                    numbers = self._follow(key).numbers
-                if numbers is not None:
-                    cells[key] = numbers
-                elif level + 1 < _LEVELS:
-                    half = 0.5 * self.widths[level]
-                    within = [
-                        (max(low, x - half), min(high, x + half))
-                        for x, (low, high) in zip(self._centre(key), limits, strict=True)
-                    ]
-                    waiting.append((level + 1, self._keys_between(level + 1, within)))
-        return cells
+            places = waiting.pop()
+            if make((0, *places)):
+                # Ways go from cell to cell, also across a corner.
+                around = product(*(range(k - 1, k + 2) for k in places))
+                inside = (to for to in around if all(map(contains, ranges, to)))
+                waiting |= {to for to in inside if (0, *to) not in tried}
+        return None if len(cells) > most or len(tried) > _TRIED * most else cells
+
+    def _halve(self, key: Key, limits: Sequence[tuple[float, float]]) -> Iterator[Key]:
+        """Yield the cells of half the width that lie in a cell and within limits."""
+        level, half = key[0] + 1, 0.5 * self.widths[key[0]]
+        within = [
+            (max(low, x - half), min(high, x + half))
+            for x, (low, high) in zip(self._centre(key), limits, strict=True)
+        ]
+        yield from product((level,), *self._keys_between(level, within))
+
+    def _limits_to_fill(self) -> Iterator[tuple[float, float]]:
+        """Yield the limits of each input; half a turn about the pose if the links are back."""
+        farthest = _FARTHEST * self.widths[0]
+        for given, gained in zip(self._inputs, self._gained_in_turns, strict=True):
+            reach = farthest if gained is None else pi
+            yield max(given.low, given.home - reach), min(given.high, given.home + reach)
 
     def _keys_between(self, level: int, limits: Sequence[tuple[float, float]]) -> list[range]:
         """Return for each input the places of the cells between two values."""
@@ -505,7 +534,7 @@ class Grid:
         cell = self._make_cell(key, before)
         found = _Found(cell, cell or before, cell.numbers if cell else None)
         tell_progress('cells of links that close only together made', len(self._kept))
-        if len(self._kept) >= self._most_kept:
+        if len(self._kept) >= self.most_cells:
             del self._kept[next(iter(self._kept))]
         self._kept[key] = found
         return found

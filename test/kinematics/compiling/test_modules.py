@@ -22,7 +22,9 @@ from typing import Any
 
 from campaigns.topologies.families import FAMILIES
 import linkage_ros as lr
+from linkage_ros.description import parse_yaml, read_any_closure
 from linkage_ros.kinematics import Closure, Limits, turn_to_pose
+from linkage_ros.resources import named_file
 from linkage_ros.tools.models.source_code import (
     C,
     FUNCTIONS,
@@ -84,7 +86,7 @@ def planar_group_of_two_inputs():
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('language', [JavaScript(), C('hexapod', header=False), PythonModule(2)])
 def test_source_writers_refuse_a_hexapod_with_too_many_cells(language):
-    told = '6 inputs .* too many cells; give the inputs of the file limits'
+    told = '6 inputs .* more than .* cells; give the inputs of the file limits'
     with pytest.raises(lr.DefinitionError, match=told):
         write_source(subject(closure_of('hexapod')), language)
 
@@ -255,6 +257,10 @@ def test_source_code_holds_the_cells_of_two_input_linkages(run, make, reach, tmp
     told = run(subject(closure), given, tmp_path)
     assert sum(one.status == 'CLOSED' for one in told) > 290
     assert {one.status for one in told[-2:]} <= {'LIMITED', 'UNDECIDED'}
+    assert_decided_states_equal_the_steps(run, closure, given, told)
+
+
+def assert_decided_states_equal_the_steps(run, closure, given, told):
     for state, one in zip(given, told, strict=True):
         if one.status != 'UNDECIDED':
             expected = plain(closure, state)
@@ -263,6 +269,24 @@ def test_source_code_holds_the_cells_of_two_input_linkages(run, make, reach, tmp
                 assert one.values == pytest.approx(expected.values, rel=1e-12, abs=1e-12)
             else:
                 assert one == expected, state
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize('run', RUN_IN.values(), ids=RUN_IN)
+def test_source_code_holds_the_cells_of_motors_that_turn_fully(run, tmp_path):
+    """Of the ankle's motors without limits a turn about the pose is all that code needs."""
+    text = named_file('ankle', 'linkages').read_text('utf-8').replace('limits: [-0.6, 0.6]', '')
+    ankle = read_any_closure(parse_yaml(text.encode(), 'ankle.yaml'))
+    closure, random = ankle.driven_by('m1', 'm2'), Random(1)
+    given = [
+        tuple(random.uniform(-reach, reach) for reach in (9.0, 9.0, 3.0, 3.0, 3.0, 3.0))
+        for _ in range(300)
+    ]
+    told = run(subject(closure), given, tmp_path)
+    closed = [plain(closure, state).status == 'CLOSED' for state in given]
+    decided = [one.status != 'UNDECIDED' for one in told]
+    assert 0.6 * len(given) < sum(decided) <= sum(closed) < 1.02 * sum(decided)
+    assert_decided_states_equal_the_steps(run, closure, given, told)
 
 
 DRIVEN = {

@@ -108,11 +108,11 @@ def test_whole_turns_of_the_crank_repeat_the_pose(turns):
 def test_cells_within_limits_cover_all_solved_states():
     one, other = closure_of('ankle_motors'), closure_of('ankle_motors')
     (grid,), (met,) = one.grids, other.grids
-    cells = grid.fill()
+    cells = grid.fill(4096)
     assert {key[0] for key in cells} == {0}
     for inputs in random_inputs(other, 300, 0.6):
         assert met(*inputs) in cells.values()
-    assert closure_of('hexapod').grids[0].fill() is None
+    assert closure_of('hexapod').grids[0].fill(4096) is None
 
 
 @pytest.mark.sample(1)

@@ -222,12 +222,12 @@ class Language(ABC):
 
     def list_cells(self, grid: Grid) -> list[tuple[tuple[int, ...], tuple[float, ...]]]:
         """Return level and place of each cell, in order, and its numbers."""
-        cells = grid.fill()
+        cells = grid.fill(grid.most_cells)
         if cells is None:
             raise DefinitionError(
                 'input',
                 f'{len(grid.home)} inputs move links that close only together, and within their '
-                'limits are too many cells',
+                f'limits are more than {grid.most_cells} cells',
                 'give the inputs of the file limits, or narrower ones',
             )
         return sorted(cells.items())
