@@ -17,7 +17,6 @@ import subprocess
 import pytest
 
 from .conftest import Run
-from ..support.scenes import iterated_with_two_inputs
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 FOUR_BAR = str(LINKAGES / 'four_bar.yaml')
@@ -51,10 +50,12 @@ def test_file_name_that_is_no_c_name_is_refused(linkage: Run, tmp_path: Path) ->
     assert linkage('compile', '4.yaml', '-o', 'a.py').returncode == 0
 
 
-def test_compile_names_the_line_of_iterated_two_input_links(linkage: Run, tmp_path: Path) -> None:
-    (tmp_path / 'two.yaml').write_text(iterated_with_two_inputs(), 'utf-8')
-    said = refused(linkage, 'two.yaml', '-o', 'a.c')
-    assert said.startswith('two.yaml:18: input: 2 inputs move links that close only together')
+def test_compile_names_the_line_of_inputs_with_too_many_cells(
+    linkage: Run, tmp_path: Path
+) -> None:
+    shutil.copy(LINKAGES / 'space' / 'hexapod.yaml', tmp_path)
+    said = refused(linkage, 'hexapod.yaml', '-o', 'a.c')
+    assert said.startswith('hexapod.yaml:35: input: 6 inputs move links that close only together')
     assert not (tmp_path / 'a.c').exists()
 
 

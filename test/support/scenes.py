@@ -142,7 +142,7 @@ def pipeline_of(text: str | bytes, linkage: str | bytes = FOUR_BAR) -> Pipeline:
 
 
 def iterated_with_two_inputs() -> str:
-    """Return a linkage file whose iterated links hang on two cranks: it cannot be compiled."""
+    """Return a linkage file whose iterated links hang on two cranks that turn fully."""
     text = (LINKAGES / 'class_3.yaml').read_text('utf-8')
     for old, new in {
         'O2: [0.180, 0.020]': 'O4: [0.170, 0.020]',

@@ -20,7 +20,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import takewhile, zip_longest
-from math import acos, asin, ceil, cos, floor, inf, lcm, pi, remainder, sqrt, tau
+from math import acos, asin, ceil, cos, floor, inf, isfinite, lcm, pi, remainder, sqrt, tau
 from typing import Any, TYPE_CHECKING
 
 from linkage_ros.kinematics.plane.diagonals import CrankDiagonal
@@ -53,6 +53,9 @@ _POINT = 1e-9
 
 _ROUNDED = 1e-9
 """A margin farther from zero than this has a certain sign."""
+
+_SECANT = 0.97
+"""Part of the way to the zero of a secant."""
 
 _FLAT = 1e-12
 """A margin that changes less between samples, relative to itself, is constant there."""
@@ -305,20 +308,48 @@ def find_intervals(
 
 
 def interval_about(
-    closes: Callable[[float], bool], values: Sequence[float], place: float
+    margin: Callable[[float], float], values: Sequence[float], place: float
 ) -> tuple[float, float] | None:
-    """Return the part about a place that `find_intervals` yields, without the others; or None."""
+    """
+    Return the part about a place in which a margin is not negative, or None.
+
+    Of `find_intervals` it is one part, without the others.
+    """
     number, ends = bisect_left(values, place), []
     below, above = values[:number][::-1], values[number:]
     for way, back in ((below, above), (above, below)):
-        inside = [*takewhile(closes, way)] or [*takewhile(closes, back[:1])]
+        inside = [*takewhile(lambda value: margin(value) >= 0.0, way)]
+        inside = inside or [value for value in back[:1] if margin(value) >= 0.0]
         if not inside:
             return None
         count = len(inside)
         outside = way[count:] if inside[0] in way else way
-        ends.append(last_inside(closes, inside[-1], outside[0]) if outside else inside[-1])
+        ends.append(_find_end(margin, inside[-1], outside[0]) if outside else inside[-1])
     low, high = ends
     return (low, high) if low <= place <= high else None
+
+
+def _find_end(margin: Callable[[float], float], inside: float, outside: float) -> float:
+    """
+    Return a value at which a margin is 0, else the last one at which it is not negative.
+
+    Next to such a value it falls in a straight line, so secants lead there.
+    """
+    far, near = (inside, inf), (outside, margin(outside))
+    while (middle := 0.5 * (inside + near[0])) not in (inside, near[0]):
+        slope = (near[1] - far[1]) / (near[0] - far[0])
+        # A little before the zero of the secant, for inside nothing says how far it is.
+        value = near[0] - _SECANT * near[1] / slope if isfinite(slope) and slope else inside
+        if not min(inside, near[0]) < value < max(inside, near[0]):
+            value = middle
+        found = margin(value)
+        if found == 0.0:
+            return value
+        if found > 0.0:
+            inside, far = value, (value, inf)
+        else:
+            far, near = near, (value, found)
+    return inside
 
 
 def _turning_points(

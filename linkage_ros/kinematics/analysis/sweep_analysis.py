@@ -154,12 +154,18 @@ class InputSweep:
 
     def is_closed(self, value: float) -> bool:
         """Return whether every loop closes there, with no joint beyond its limits."""
+        return self._closing_margin(value) >= 0.0
+
+    def _closing_margin(self, value: float) -> float:
+        """Return how far loops are from closing there, negative; 0 at a toggle, else infinite."""
         inputs = self.inputs_at(value)
         position = self.closure.position(*inputs)
+        if not position.joints:
+            return -position.gap or -inf
         bounds = self.closure.bounds
-        return bool(position.joints) and not (
-            bounds and bounds.first_exceeded(inputs, position.joints)
-        )
+        if bounds and bounds.first_exceeded(inputs, position.joints):
+            return -inf
+        return 0.0 if position.status is Status.TOGGLE else inf
 
     @BuiltProperty
     def ranges(self) -> tuple[InputRange, ...]:
@@ -181,7 +187,7 @@ class InputSweep:
         """Return the range in which a value lies, or None."""
         if self.closure.grids and self.closure.zero_length is None:
             # States beyond the reach of such links take long: the other ranges are not asked for.
-            part = interval_about(self.is_closed, self._samples, value)
+            part = interval_about(self._closing_margin, self._samples, value)
             if part and (self._is_cut or not {*part} & {self._samples[0], self._samples[-1]}):
                 return self._usual_range(self._name_ends(*part))
         for interval in self.ranges:

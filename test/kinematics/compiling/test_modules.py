@@ -38,6 +38,7 @@ import pytest
 from .emitted import COUNT, needs, NUMBERS, parts, plain, run_c, State, states, subject, Told
 from .test_c import GALLERY, limited
 from ..test_gallery import closure_of
+from ...support.scenes import iterated_with_two_inputs
 
 _ULPS = 4
 """So many units in the last place may a function of JavaScript be off."""
@@ -271,13 +272,22 @@ def assert_decided_states_equal_the_steps(run, closure, given, told):
                 assert one == expected, state
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize('run', RUN_IN.values(), ids=RUN_IN)
-def test_source_code_holds_the_cells_of_motors_that_turn_fully(run, tmp_path):
-    """Of the ankle's motors without limits a turn about the pose is all that code needs."""
+def ankle_of_free_motors() -> Closure:
+    """Return the ankle driven by its motors, which have no limits."""
     text = named_file('ankle', 'linkages').read_text('utf-8').replace('limits: [-0.6, 0.6]', '')
-    ankle = read_any_closure(parse_yaml(text.encode(), 'ankle.yaml'))
-    closure, random = ankle.driven_by('m1', 'm2'), Random(1)
+    return read_any_closure(parse_yaml(text.encode(), 'ankle.yaml')).driven_by('m1', 'm2')
+
+
+def platform_of_two_cranks() -> Closure:
+    return read_any_closure(parse_yaml(iterated_with_two_inputs().encode(), 'two.yaml'))
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize('make', [ankle_of_free_motors, platform_of_two_cranks])
+@pytest.mark.parametrize('run', RUN_IN.values(), ids=RUN_IN)
+def test_source_code_holds_the_cells_of_inputs_that_turn_fully(run, make, tmp_path):
+    """A turn about the pose is all that code needs."""
+    closure, random = make(), Random(1)
     given = [
         tuple(random.uniform(-reach, reach) for reach in (9.0, 9.0, 3.0, 3.0, 3.0, 3.0))
         for _ in range(300)

@@ -18,7 +18,7 @@ from xml.etree import ElementTree as ET
 
 import linkage_ros as lr
 from linkage_ros.errors import LinkageError
-from linkage_ros.resources import shipped_path
+from linkage_ros.resources import named_file, shipped_path
 from linkage_ros.tools.view import (
     EXPORT_KINDS,
     export_linkage,
@@ -30,7 +30,6 @@ from PIL import Image
 import pytest
 
 from ...support.commands import linkage
-from ...support.scenes import iterated_with_two_inputs
 
 NAMES = ('four_bar', 'slider_crank', 'five_bar')
 
@@ -87,8 +86,8 @@ def test_unknown_export_kind_is_refused(kind: str, remedy: str) -> None:
     assert str(refused.value).startswith(f"kind: '{kind}' cannot be written; {remedy}")
 
 
-def test_source_export_of_two_iterated_inputs_is_refused() -> None:
-    text = iterated_with_two_inputs()
+def test_source_export_of_inputs_with_too_many_cells_is_refused() -> None:
+    text = named_file('hexapod', 'linkages').read_text('utf-8')
     request = read_request(json.dumps({'id': 1, 'do': 'export', 'kind': 'c', 'text': text}))
-    answer = json.loads(RequestHandler('class_3', None, pytest.fail).answer_request(1, request))
-    assert 'within their limits are too many cells' in answer['error']['text']
+    answer = json.loads(RequestHandler('hexapod', None, pytest.fail).answer_request(1, request))
+    assert 'within their limits are more than' in answer['error']['text']
