@@ -32,7 +32,7 @@ from linkage_ros.cli.page_of_run import check_page, PageOfRun, view_command
 from linkage_ros.cli.proof import LONGEST_PROOF, proof_of
 from linkage_ros.cli.table import Table
 from linkage_ros.cli.terminal import print_tables
-from linkage_ros.kinematics import Linkage, Status
+from linkage_ros.kinematics import Status
 from linkage_ros.node import LinkageNode, run_linkage_node
 from linkage_ros.replay import turning_joints
 from linkage_ros.signals import heed_signals
@@ -85,9 +85,7 @@ class Display:
         """Open the page of the run, or say how it is opened."""
         if self._with_page:
             self._page = PageOfRun(node.get_fully_qualified_name(), self._say_page)
-        elif node.scene is None or all(
-            isinstance(each.linkage, Linkage) for each in node.scene.linkages
-        ):
+        else:
             self._say_page(f'{view_command()}   (in a second terminal)')
 
     def _say_page(self, line: str) -> None:

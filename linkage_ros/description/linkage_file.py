@@ -43,7 +43,6 @@ from linkage_ros.kinematics import (
     Input,
     Linkage,
     Mass,
-    PLANAR_ONLY,
     PlanarClosure,
     Point,
     RevoluteJoint,
@@ -202,7 +201,7 @@ def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[
     """Return a linkage as it is written, and the shorthand that it is written in, or ''."""
     if not is_planar_file(content):
         key = 'urdf' if 'urdf' in content else 'points'
-        raise content.error(key, 'make it a spatial linkage', PLANAR_ONLY)
+        raise content.error(key, 'makes it a spatial linkage', 'name a planar one')
     read_units(content)
     for shorthand, keys in SHORTHANDS.items():
         if shorthand in content:

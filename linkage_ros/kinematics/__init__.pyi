@@ -126,10 +126,6 @@ from linkage_ros.kinematics.plane.assembly_modes import (
     other_assemblies as other_assemblies,
     STARTS as STARTS,
 )
-from linkage_ros.kinematics.plane.checks import (
-    check_planar as check_planar,
-    PLANAR_ONLY as PLANAR_ONLY,
-)
 from linkage_ros.kinematics.plane.closure import (
     PlanarClosure as PlanarClosure,
     separate_blocks as separate_blocks,

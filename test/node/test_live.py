@@ -152,6 +152,51 @@ def test_view_turns_the_crank_by_rocker_samples(graph, start, write_scene):
         assert state['inputs'] == pytest.approx([ANGLE], abs=1e-5)
 
 
+def test_view_shows_a_spatial_node_and_turns_its_inputs(graph, start, write_scene):
+    start(
+        write_scene(
+            'delta_live', 'rate: 200\ndrive: {topic: {max_age: 0.2}}\n', linkage='space/delta'
+        )
+    )
+    closure, states = load('delta'), graph.listen(JointState, '/joint_states')
+    inputs = [0.1, -0.05, 0.2]
+    wanted = closure.position(*inputs)
+    with bridged(graph) as followed:
+        model = followed.newest('model')
+        assert model['live']['cranks'] == [None, None, None]
+        assert len(model['drawn']['camera']) == 2
+
+        def turned():
+            for number, angle in enumerate(inputs):
+                followed.ask('crank', angle=angle, input=number)
+            at_rest = states and states[-1].position[:] == pytest.approx(wanted.joints, abs=1e-9)
+            return at_rest and followed.newest('state')
+
+        state = wait_for(turned, 'the pose of these angles')
+        assert state['inputs'] == pytest.approx(inputs, abs=1e-6)
+        places = list(zip(*[iter(state['frames'])] * 3, strict=True))
+        assert {pin['name'] for pin in model['pins']} == {*closure.linkage.points}
+        for pin in model['pins']:
+            place = closure.named_points(wanted)[pin['name']]
+            assert places[pin['link']] == pytest.approx(place, abs=1e-6)
+
+
+def test_view_applies_an_effort_to_each_of_two_motors(graph, start, write_scene):
+    commands = graph.listen(JointState, '/crank_commands')
+    scene = 'rate: 200\ndrive: {torque: {timeout: 0.2}}\npublish_input: true\n'
+    start(write_scene('ankle_live', scene, linkage='space/ankle_motors'))
+    with bridged(graph) as followed:
+        assert len(followed.newest('model')['live']['efforts']) == 2
+
+        def both():
+            followed.ask('effort', value=0.1, input=0)
+            followed.ask('effort', value=-0.2, input=1)
+            return commands and dict(zip(commands[-1].name, commands[-1].effort, strict=True))
+
+        assert wait_for(lambda: both() == {'m1': 0.1, 'm2': -0.2}, 'efforts of both motors')
+        assert 'is not the index of an input' in followed.ask('effort', value=1.0, input=2)
+
+
 def test_view_switches_a_fault_and_a_recording(graph, start, scene):
     states = graph.listen(JointState, '/joint_states')
     start(scene)

@@ -13,9 +13,8 @@ from __future__ import annotations
 from collections import Counter
 from itertools import combinations
 from math import hypot, isfinite
-from typing import Any
 
-from linkage_ros.errors import DefinitionError, LinkageError, list_names, quote
+from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.checks import (
     check_all_limits,
     check_inputs,
@@ -38,16 +37,6 @@ _SHORTEST = 2.0**-511
 
 _LEAST_RATIO = 1e-30
 """Least distance of two pins relative to the linkage; in a shorter one no digit would be left."""
-
-
-PLANAR_ONLY = 'name a planar one; view and its pages without --node show others'
-"""Remedy where a spatial linkage is of no use."""
-
-
-def check_planar(name: str, linkage: Any) -> None:
-    """Refuse a spatial linkage with a LinkageError."""
-    if not isinstance(linkage, Linkage):
-        raise LinkageError(name, 'is a spatial linkage', PLANAR_ONLY)
 
 
 def check_linkage(linkage: Linkage) -> None:

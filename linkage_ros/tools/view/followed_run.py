@@ -9,13 +9,15 @@
 """
 What a page knows of a running node's scene, and of its messages.
 
-The poses come from the published joints, as in the report, and not from the inputs by the program
-of `linkage compile`: the page shows what the node has published, with its noise, play and faults.
+In the plane the poses come from the published joints, as in the report, and not from the inputs by
+the program of `linkage compile`: the page shows what the node has published, with its noise, play
+and faults. In space they come from the inputs, as in the report.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import repeat
 from math import dist, isfinite, nan
 from typing import Any, NamedTuple
 
@@ -24,18 +26,18 @@ from linkage_ros.bag import read_run_metadata, RunMetadata
 from linkage_ros.cli import finite_or_none
 from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import LinkageError, quote
-from linkage_ros.kinematics import check_planar, GROUND, PlanarClosure
+from linkage_ros.kinematics import Closure, GROUND, PlanarClosure, SpaceClosure, SpaceDrawing
 from linkage_ros.messages import CrankSample, MalformedError
 from linkage_ros.replay import read_announced, recorded_scene
 from linkage_ros.tools.view.model import model_of
-from linkage_ros.tools.view.report import link_poses
+from linkage_ros.tools.view.report import link_poses, spatial_places
 import numpy as np
 
 _LONGEST_LEAD = 0.25
 """Most time by which a crank sample is carried to the time of the joints, in [s]."""
 
 _USUAL_EFFORT = 1.0
-"""Range of the slider for an effort that has no limit, in [N·m] or [N]."""
+"""Range of the slider for an effort that has no limit, in [N·m] or [N]; more can be typed."""
 
 _BY_TOPIC = ('topic', 'torque')
 """Drives that listen to a topic."""
@@ -47,7 +49,8 @@ class FollowedRun(NamedTuple):
     scene: Scene  # The scene
     metadata: RunMetadata  # The run's account of itself: its topics
     drawn_linkage: SceneLinkage  # The first linkage, which is drawn
-    closure: PlanarClosure  # The closure of that one
+    closure: Closure  # The closure of that one
+    drawing: SpaceDrawing | None  # What is drawn of it in space; None in the plane
     # The linkage whose crank or effort comes from a topic; None if there is none.
     topic_driven: SceneLinkage | None
     model: dict[str, Any]  # What a page gets
@@ -98,11 +101,19 @@ class FollowedRun(NamedTuple):
         return [angle + rate * lead for angle, rate in zip(crank.angles, crank.rates, strict=True)]
 
     def _link_frames(self, known: Mapping[str, float]) -> list[float] | None:
-        """Return place and angle of the frame of each link; None if they are unknown."""
+        """
+        Return place and angle of the frame of each link; in space the places that are drawn.
+
+        None if they are unknown.
+        """
+        input_names = self.drawn_linkage.input_names
         values = {name: np.array([value]) for name, value in known.items()}
-        found = link_poses(
-            self.closure, self.drawn_linkage.prefix, values, self.drawn_linkage.input_names
-        )
+        if self.drawing is not None:
+            inputs = [values[name] for name in input_names]
+            places = spatial_places(self.drawing, inputs)[0]
+            return places.ravel().tolist() if np.isfinite(places).all() else None
+        assert isinstance(self.closure, PlanarClosure)
+        found = link_poses(self.closure, self.drawn_linkage.prefix, values, input_names)
         if not set(self.model['links']) <= set(found.links):
             return None
         order = [found.links.index(link) for link in self.model['links']]
@@ -120,34 +131,25 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
         announced = read_announced(message, topic)
         scene, account = recorded_scene(announced), read_run_metadata(announced)
         shown = scene.linkages[0]
-        check_planar(scene.name, shown.linkage)
-        closure = PlanarClosure(shown.linkage)
+        closure = shown.closure
         model = model_of(closure, scene.name)
+        drawing = SpaceDrawing(closure) if isinstance(closure, SpaceClosure) else None
     except (ValueError, ArithmeticError, MalformedError) as error:
         raise LinkageError(topic, f'is not valid: {quote(str(error))}', 'name another') from None
     turned = next((each for each in scene.linkages if each.drive[0] in _BY_TOPIC), None)
     if not account.crank_topic:
         turned = None
-    model |= {'live': _beside_model(scene, closure, turned)}
-    return FollowedRun(scene, account, shown, closure, turned, model)
+    model |= {'live': _live_model(scene, closure, turned)}
+    return FollowedRun(scene, account, shown, closure, drawing, turned, model)
 
 
-def _beside_model(
-    scene: Scene, closure: PlanarClosure, topic_driven: SceneLinkage | None
+def _live_model(
+    scene: Scene, closure: Closure, topic_driven: SceneLinkage | None
 ) -> dict[str, Any]:
-    """Return what a page shows of a scene beside the model of its first linkage."""
+    """Return what a page shows of a scene in addition to the model of its first linkage."""
     shown = scene.linkages[0]
-    cranks: list[list[float] | None] = []
-    for given in closure.linkage.inputs:
-        # A crank on the ground is turned by the mouse about its pin.
-        points = closure.linkage.links.get(given.child, {})
-        ground = closure.linkage.links[GROUND]
-        pivots = [name for name in points if name in ground]
-        if given.unit != 'rad' or given.parent != GROUND or not pivots:
-            cranks.append(None)
-            continue
-        reach = max(dist(point, points[pivots[0]]) for point in points.values())
-        cranks.append([*ground[pivots[0]], reach])
+    inputs = closure.linkage.inputs
+    of_plane = _ground_cranks(closure) if isinstance(closure, PlanarClosure) else None
     return {
         'joints': [
             [name, 'rad' if turning else 'm']
@@ -157,18 +159,28 @@ def _beside_model(
             )
         ],
         'inputs': list(shown.input_names),
-        'cranks': cranks,
+        'cranks': list(of_plane or repeat(None, len(inputs))),
         'turned': topic_driven is shown,
         'drive': (topic_driven or shown).drive[0],
-        'effort': _range_of_effort(closure),
+        'efforts': [
+            driven.limits.effort if isfinite(driven.limits.effort) else _USUAL_EFFORT
+            for driven in inputs
+        ],
         'linkages': len(scene.linkages),
     }
 
 
-def _range_of_effort(closure: PlanarClosure) -> float:
-    """Return the greatest effort of a slider, in [N·m] or [N]; a greater one can be typed."""
-    limit = closure.linkage.inputs[0].limits.effort
-    return limit if isfinite(limit) else _USUAL_EFFORT
+def _ground_cranks(closure: PlanarClosure) -> Iterator[list[float] | None]:
+    """Yield pin and length of each crank on the ground: there the mouse turns it."""
+    links = closure.linkage.links
+    for driven in closure.linkage.inputs:
+        points, ground = links.get(driven.child, {}), links[GROUND]
+        pivots = [name for name in points if name in ground]
+        if driven.unit != 'rad' or driven.parent != GROUND or not pivots:
+            yield None
+            continue
+        reach = max(dist(point, points[pivots[0]]) for point in points.values())
+        yield [*ground[pivots[0]], reach]
 
 
 def diagnostics_content(statuses: Sequence[DiagnosticStatus]) -> dict[str, Any]:

@@ -16,13 +16,12 @@ const Live = (() => {
   const [TRY_LATER, GOING_AWAY] = [1013, 1001];
   const at = (id) => document.getElementById(id);
   const seen = { model: null, node: null, state: null, heard: 0, open: false };
-  let [socket, canvas, linkage, hands, drawn] = [null, null, null, [], false];
+  let [socket, canvas, spatial, linkage, hands, drawn] = [null, null, null, null, [], false];
 
   /** The poses of the last seconds, as a canvas draws them. */
   class Poses {
     constructor(model) {
       this.drawn = model.drawn;
-      this.reach = model.drawn.frame;
       this.places = new Map(model.links.map((link, i) => [link, 3 * i]));
       this.times = [];
       this.frames = [];
@@ -32,6 +31,10 @@ const Live = (() => {
       if (this.times.length && time < this.times.at(-1)) this.times = this.frames = [];
       this.times = [...this.times.slice(1 - TRAIL), time];
       this.frames = [...this.frames.slice(1 - TRAIL), frames];
+    }
+
+    get reach() {
+      return this.drawn.frame;
     }
 
     hasPose(number) {
@@ -45,6 +48,18 @@ const Live = (() => {
       const i = this.places.get(link);
       const [cos, sin] = [Math.cos(frames[i + 2]), Math.sin(frames[i + 2])];
       return [frames[i] + cos * x - sin * y, frames[i + 1] + sin * x + cos * y];
+    }
+  }
+
+  /** The same of a spatial linkage, whose frames are the places of its drawing. */
+  class SpatialPoses extends Space.seen(Poses) {
+    constructor(model) {
+      super(model);
+      this.look(...model.drawn.camera);
+    }
+
+    spot(row, number) {
+      return this.frames[number]?.slice(3 * row, 3 * row + 3) ?? null;
     }
   }
 
@@ -96,10 +111,7 @@ const Live = (() => {
   function showModel(model) {
     seen.model = model;
     seen.state = null;
-    linkage = new Poses(model);
-    canvas.linkage = linkage;
-    canvas.curves = null;
-    canvas.fit(Picture.ink());
+    showPicture(model);
     at('title').textContent = `${model.name}: ${Page.data.node}`;
     const more = model.live.linkages - 1;
     at('more').textContent = more ? `The scene has ${more} more ${more > 1 ? 'linkages, which are' : 'linkage, which is'} not drawn.` : '';
@@ -110,6 +122,19 @@ const Live = (() => {
     showHands(model);
     at('faults').replaceChildren();
     draw();
+  }
+
+  function showPicture(model) {
+    const picture = at('live').querySelector('canvas');
+    const inSpace = Boolean(model.drawn.camera);
+    linkage = inSpace ? new SpatialPoses(model) : new Poses(model);
+    if (inSpace) spatial ??= new Space.Canvas(picture, linkage, schedule);
+    canvas = inSpace ? spatial : new Picture.Canvas(picture, linkage);
+    Object.assign(canvas, { linkage, curves: null, tallest: 620, absent: 'no pose is known' });
+    picture.classList.toggle('orbit', inSpace);
+    if (inSpace) picture.tabIndex = 0;
+    else picture.removeAttribute('tabindex');
+    canvas.fit(Picture.ink());
   }
 
   function showNode(node) {
@@ -266,22 +291,26 @@ const Live = (() => {
         });
       });
     } else if (live.drive === 'torque') {
-      const unit = model.inputs[0].unit === 'rad' ? 'N·m' : 'N';
-      hands = [new Hand(`effort [${unit}]`, {
-        low: -live.effort, high: live.effort, step: live.effort / 200, factor: 1, speak: (value) => send({ do: 'effort', value }),
-      })];
+      const several = model.inputs.length > 1;
+      hands = model.inputs.map(({ name, unit }, input) => {
+        const most = live.efforts[input];
+        return new Hand(`effort ${several ? `of ${name} ` : ''}[${unit === 'rad' ? 'N·m' : 'N'}]`, {
+          low: -most, high: most, step: most / 200, factor: 1, speak: (value) => send({ do: 'effort', value, input }),
+        });
+      });
     }
     const note = element('p', { className: 'note' });
     note.textContent = hands.length
-      ? 'Without “hold”, the crank is released one second after the last movement. It can be turned in the picture, too.'
+      ? 'Without “hold”, the crank is released one second after the last movement.'
       : `The scene drives the crank itself (${live.drive}).`;
+    if (hands.length && live.cranks.some(Boolean)) note.textContent += ' It can be turned in the picture, too.';
     if (live.drive === 'torque') note.textContent = 'Without “hold”, the effort ends after one second.';
     at('hands').replaceChildren(...hands.map((hand) => hand.box), note);
   }
 
   /** Let a pointer turn a crank in the picture. */
   function turnByPointer() {
-    const picture = canvas.canvas;
+    const picture = at('live').querySelector('canvas');
     let grip = null;
 
     const place = ({ clientX, clientY }) => {
@@ -290,9 +319,10 @@ const Live = (() => {
     };
 
     /** Return which crank is at a place; -1 for none. */
-    const gripped = ([x, y]) => {
+    const gripped = (event) => {
       const live = seen.model?.live;
       if (!live?.turned || live.drive !== 'topic' || !seen.state) return -1;
+      const [x, y] = place(event);
       return live.cranks.findIndex((crank, i) => crank && typeof seen.state.inputs[i] === 'number'
         && Math.hypot(x - crank[0], y - crank[1]) < 1.5 * crank[2]);
     };
@@ -300,10 +330,10 @@ const Live = (() => {
     const direction = ([x, y], [px, py]) => Math.atan2(y - py, x - px);
 
     picture.addEventListener('touchstart', (event) => {
-      if (gripped(place(event.touches[0])) >= 0) event.preventDefault(); // it does not scroll
+      if (gripped(event.touches[0]) >= 0) event.preventDefault(); // it does not scroll
     }, { passive: false });
     picture.addEventListener('pointerdown', (event) => {
-      const input = gripped(place(event));
+      const input = gripped(event);
       if (input < 0) return;
       const crank = seen.model.live.cranks[input];
       grip = { input, crank, from: direction(place(event), crank), angle: seen.state.inputs[input] };
@@ -313,7 +343,7 @@ const Live = (() => {
     });
     picture.addEventListener('pointermove', (event) => {
       if (!grip) {
-        picture.style.cursor = gripped(place(event)) >= 0 ? 'grab' : '';
+        picture.style.cursor = gripped(event) >= 0 ? 'grab' : '';
         return;
       }
       const to = direction(place(event), grip.crank);
@@ -330,12 +360,7 @@ const Live = (() => {
   }
 
   function begin() {
-    const picture = at('live').querySelector('canvas');
-    linkage = null;
-    canvas = new Picture.Canvas(picture, null);
-    canvas.tallest = 620;
-    canvas.absent = 'no pose is known';
-    Page.keepDrawn([picture.parentElement], () => {
+    Page.keepDrawn([at('live').querySelector('figure')], () => {
       if (!linkage) return;
       canvas.fit(Picture.ink());
       draw();

@@ -170,7 +170,7 @@ class LiveBridge:
         self._hand = HandCrank(())
         self._hand_publisher: Any = None
         self._hand_timer: Any = None
-        self._effort: tuple[float, float] = (0.0, -inf)
+        self._efforts: dict[str, tuple[float, float]] = {}  # Of each input, with the time
         self.name = ''
         try:
             self.name = self._find_node(name, patience)
@@ -310,7 +310,7 @@ class LiveBridge:
             node.destroy_publisher(self._hand_publisher)
             self._hand_publisher = None
         self._cranks = None
-        self._effort = 0.0, -inf
+        self._efforts = {}
         self._faults = dict.fromkeys(run.scene.faults, False)
         self._run_subscriptions = []
         # Taken by a timer, so that a fast node costs this process nothing.
@@ -504,12 +504,7 @@ class LiveBridge:
     def _turn_crank(self, content: Mapping[str, Any]) -> str:
         run, target = self._require_drive('topic', 'crank'), _read_number(content, 'angle')
         assert run.topic_driven is not None
-        number = content.get('input', 0)
-        if type(number) is not int or not 0 <= number < len(run.topic_driven.input_names):
-            count = len(run.topic_driven.input_names)
-            raise LinkageError(
-                'input', f'{quote(number)} is not the index of an input', f'name one of {count}'
-            )
+        number = _read_input(content, len(run.topic_driven.input_names))
         at = [0.0] * len(run.topic_driven.input_names)
         known = self._cranks if run.topic_driven is run.drawn_linkage else None
         if known is not None and all(map(isfinite, known.angles)):
@@ -522,9 +517,12 @@ class LiveBridge:
 
     def _apply_effort(self, content: Mapping[str, Any]) -> str:
         run = self._require_drive('torque', 'effort')
-        self._effort = _read_number(content, 'value'), monotonic()
+        assert run.topic_driven is not None
+        number = _read_input(content, len(run.topic_driven.input_names))
+        effort = _read_number(content, 'value')
+        self._efforts[run.topic_driven.input_names[number]] = effort, monotonic()
         self._start_hand(run)
-        return f'effort {self._effort[0]:g} on {run.crank_topic}'
+        return f'effort {effort:g} on {run.crank_topic}'
 
     def _require_drive(self, drive: str, what: str) -> FollowedRun:
         run = self._run
@@ -555,9 +553,12 @@ class LiveBridge:
         if (followed := self._hand.advance_to(now)) is not None:
             message = self._write_crank(stamp, *followed)
             self._hand_publisher.handle.publish_raw(message)
-        elif now - self._effort[1] <= HELD:
-            command = JointState(name=list(self._run.topic_driven.input_names[:1]))
-            command.effort = [self._effort[0]]
+        elif held := {
+            joint: effort
+            for joint, (effort, since) in self._efforts.items()
+            if now - since <= HELD
+        }:
+            command = JointState(name=list(held), effort=list(held.values()))
             command.header.stamp.sec, command.header.stamp.nanosec = divmod(stamp, NANOSECONDS)
             self._hand_publisher.publish(command)
         else:
@@ -582,6 +583,14 @@ def _read_number(content: Mapping[str, Any], key: str) -> float:
     if type(value) not in (int, float) or not abs(value) <= _FARTHEST:
         raise LinkageError(key, f'{quote(value)} is not valid', 'send a number')
     return float(value)
+
+
+def _read_input(content: Mapping[str, Any], count: int) -> int:
+    number = content.get('input', 0)
+    if type(number) is not int or not 0 <= number < count:
+        reason = f'{quote(number)} is not the index of an input'
+        raise LinkageError('input', reason, f'name one of {count}')
+    return number
 
 
 def _read_flag(content: Mapping[str, Any]) -> bool:

@@ -26,6 +26,7 @@ from linkage_ros.tools.view.report.data import (
     event_tracks as event_tracks,
     link_poses as link_poses,
     page_data as page_data,
+    spatial_places as spatial_places,
     time_plots as time_plots,
     zero_plots as zero_plots,
 )

@@ -347,19 +347,25 @@ def _drawing_of(
     return (drawn, size, '') if size <= space else (None, 0, 'no room on the page')
 
 
-def _spatial_poses(closure: SpaceClosure, inputs: Sequence[Numbers]) -> tuple[Poses, Any]:
-    """Return places of a spatial linkage instead of frames, and its drawing."""
-    drawing, count = SpaceDrawing(closure), len(inputs[0])
-    found = np.full((count, drawing.count, 3), np.nan)
-    for i, given in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
-        if all(abs(value) < _FARTHEST for value in given):
-            position = closure.position(*given)
+def spatial_places(drawing: SpaceDrawing, inputs: Sequence[Numbers]) -> Numbers:
+    """Return the places of a spatial drawing at inputs, (N, places, 3); NaN where it is open."""
+    found = np.full((len(inputs[0]), drawing.count, 3), np.nan)
+    for i, values in enumerate(zip(*(column.tolist() for column in inputs), strict=True)):
+        if all(abs(value) < _FARTHEST for value in values):
+            position = drawing.closure.position(*values)
             if position.joints:
                 found[i] = drawing.places(position)
+    return found
+
+
+def _spatial_poses(closure: SpaceClosure, inputs: Sequence[Numbers]) -> tuple[Poses, Any]:
+    """Return places of a spatial linkage instead of frames, and its drawing."""
+    drawing = SpaceDrawing(closure)
+    found = spatial_places(drawing, inputs)
     known = found[np.isfinite(found).all(axis=(1, 2))]
     if not len(known):
         known = drawing.places(closure.position(*usual_inputs(closure)))[None]
-    return Poses((), found, np.full(count, np.nan), ''), space_page_data(drawing, known)
+    return Poses((), found, np.full(len(found), np.nan), ''), space_page_data(drawing, known)
 
 
 def _linkage_json(linkage: LinkageRun, found: Poses) -> dict[str, Any]:
