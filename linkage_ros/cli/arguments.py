@@ -25,8 +25,15 @@ from linkage_ros.description import (
     TABLE_KINDS,
     Units,
 )
-from linkage_ros.errors import decimal_comma, FileError, LinkageError, list_names, quote
-from linkage_ros.kinematics import Linkage
+from linkage_ros.errors import (
+    decimal_comma,
+    did_you_mean,
+    FileError,
+    LinkageError,
+    list_names,
+    quote,
+)
+from linkage_ros.kinematics import Closure, Linkage
 
 PICTURES = ('.png', '.svg', '.pdf')
 """Suffixes of the pictures that matplotlib writes."""
@@ -211,6 +218,34 @@ def add_at(parser: argparse.ArgumentParser, text: str) -> None:
         metavar='VALUE',
         help=f'{text}; of several inputs, in their order: --at 10 -5',
     )
+
+
+def add_over(parser: argparse.ArgumentParser, text: str) -> None:
+    """Declare ``--over``."""
+    parser.add_argument(
+        '--over',
+        metavar='INPUT',
+        help=f'{text}; the others are held as in the last --at, else as they are drawn',
+    )
+
+
+def input_over(closure: Closure, named: str | None, option: str, otherwise: str) -> int:
+    """
+    Return the number of the input that ``--over`` names; of several one has to be named.
+
+    ``option`` needs it, and ``otherwise`` is what a user may do instead.
+    """
+    names = closure.input_names
+    if named is None:
+        if len(names) > 1:
+            reason = f'there are {len(names)} inputs'
+            remedy = f'name one, as --over {names[0]}, or {otherwise}'
+            raise LinkageError(option, reason, remedy)
+        return 0
+    if named not in names:
+        remedy = did_you_mean(named, names, f'name {list_names(names)}')
+        raise LinkageError(f'--over {named}', 'is not an input', remedy)
+    return names.index(named)
 
 
 def read_input(text: str) -> float:

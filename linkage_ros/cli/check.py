@@ -20,11 +20,15 @@ from threading import Event
 from typing import Any
 
 from linkage_ros.cli.arguments import (
+    add_at,
     add_file,
+    add_over,
     add_radians,
     add_robot,
     DisplayUnits,
     finite_or_none,
+    input_over,
+    read_inputs,
     robot_of,
 )
 from linkage_ros.cli.linkage_facts import linkage_facts
@@ -34,6 +38,7 @@ from linkage_ros.cli.terminal import ProgressCallback, show_progress
 from linkage_ros.description import linkage_content, linkage_notes, read_any_closure
 from linkage_ros.errors import DefinitionError, LinkageError, list_names
 from linkage_ros.kinematics import (
+    branches_over,
     closes_in_two_ways,
     closing_name,
     Closure,
@@ -82,6 +87,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='store_true',
         help='add the branches of each dependent joint: crank intervals in which it moves one way',
     )
+    add_over(parser, 'with --branches, the input that moves, of several')
+    add_at(parser, 'with --branches, where the inputs are that --over does not name')
     add_radians(parser)
 
 
@@ -93,14 +100,32 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     for note in linkage_notes(closure.linkage, content):
         print(f'linkage check: note: {content.locate_error(note)}', file=sys.stderr)
     units = arguments.angles = arguments.angles.of_file(content.units)
+    sweep = _branches_sweep(closure, arguments)
     with show_progress('parts examined') as advance:
         described, tables = _describe_linkage(closure, advance)
-        if arguments.branches:
-            tables = [*tables, _branches_table(closure)]
+        if sweep:
+            tables = [*tables, _branches_table(sweep, units)]
             described |= tables_json(tables[-1:])
     account = {'file': arguments.file, **described}
     show_result(Result(account, [*_linkage_tables(account, tables, units)]), arguments, units)
     return 0
+
+
+def _branches_sweep(closure: Closure, arguments: argparse.Namespace) -> InputSweep | None:
+    """Return the way of the input over which branches are asked for; None if they are not."""
+    states = [read_inputs(closure.linkage, at, '--at', arguments.angles) for at in arguments.at]
+    if not arguments.branches:
+        for option, typed in (('--over', arguments.over), ('--at', states)):
+            if typed:
+                raise LinkageError(option, 'says where branches are', 'write --branches too')
+        return None
+    number = input_over(closure, arguments.over, '--branches', 'leave it out')
+    held = states[-1] if states else usual_inputs(closure)
+    sweep = InputSweep(closure, held, number)
+    if not sweep.ranges:
+        reason = 'closes nowhere while the other inputs are held'
+        raise LinkageError(sweep.input.joint, reason, 'hold them elsewhere, by --at')
+    return sweep
 
 
 # The description of a linkage as JSON holds it: values are in SI units, and their keys say so, or
@@ -186,21 +211,20 @@ def _limits_json(linkage: Linkage | SpaceLinkage) -> list[dict[str, Any]]:
     ]
 
 
-def _list_branches(closure: Closure) -> Iterator[tuple[Any, ...]]:
+def _list_branches(sweep: InputSweep) -> Iterator[tuple[Any, ...]]:
     """Yield the branches of each joint that moves, and of each coordinate of a traced point."""
-    linkage = closure.linkage
-    if len(linkage.inputs) > 1:
-        raise LinkageError('--branches', f'there are {len(linkage.inputs)} inputs', 'leave it out')
-    names = [joint for joint in linkage.joints if joint != linkage.inputs[0].joint]
+    closure, linkage = sweep.closure, sweep.closure.linkage
+    names = [joint for joint in linkage.joints if joint not in closure.input_names]
     names += [f'{point}.{axis}' for point in linkage.traced for axis in linkage.axes]
     for name in names:
         with suppress(DefinitionError):  # It does not move.
-            for branch in closure.branches(name):
+            for branch in branches_over(sweep, name):
                 unit = 'rad' if branch.turning else 'm'
                 yield (
                     *(name, branch.number, branch.least, branch.most, unit),
                     *(Quantity(end, unit) for end in (branch.low, branch.high)),
                     *(list(branch.turns_back), branch.rises, [by or None for by in branch.by]),
+                    sweep.held_inputs,
                 )
 
 
@@ -493,8 +517,8 @@ def _links_of(closure: Closure, number: int) -> list[str]:
     return closure.links_of_group(number)
 
 
-def _branches_table(closure: Closure) -> Table:
-    given = closure.linkage.inputs[0]
+def _branches_table(sweep: InputSweep, units: DisplayUnits) -> Table:
+    given = sweep.input
 
     def input_text(value: float, units: DisplayUnits) -> str:
         return units.value_text(value, given.unit == 'rad')
@@ -513,9 +537,15 @@ def _branches_table(closure: Closure) -> Table:
         Column(None, 'turns_back'),
         Column('', 'rises', form=lambda rises, _: 'rises' if rises else 'falls'),
         Column('limits of', 'limited_by', form=limits_text),
+        Column(None, 'held'),
     )
-    title = 'Branches: between their ends a joint moves one way'
-    return Table(title, columns, [*_list_branches(closure)], 'branches')
+    turning = {one.joint: one.unit == 'rad' for one in sweep.closure.linkage.inputs}
+    at = [
+        f'{name} at {units.value_text(x, turning[name])}' for name, x in sweep.held_inputs.items()
+    ]
+    where = f', {list_names(at, " and ")}' if at else ''
+    title = f'Branches{where}: between their ends a joint moves one way'
+    return Table(title, columns, [*_list_branches(sweep)], 'branches')
 
 
 def _assemblies_table(

@@ -26,10 +26,12 @@ from typing import Any, NamedTuple
 from linkage_ros.cli.arguments import (
     add_at,
     add_file,
+    add_over,
     add_radians,
     add_robot,
     bounded_number,
     DisplayUnits,
+    input_over,
     read_input,
     read_inputs,
     read_joint_value,
@@ -39,7 +41,7 @@ from linkage_ros.cli.result import add_result, Result, show_result
 from linkage_ros.cli.table import Column, Table
 from linkage_ros.cli.terminal import show_progress
 from linkage_ros.description import linkage_content, read_any_closure
-from linkage_ros.errors import did_you_mean, LinkageError, list_names
+from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import (
     Closure,
     InputSweep,
@@ -84,12 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--sweep', action='store_true', help='solve over the range; the default without --at'
     )
-    parser.add_argument(
-        '--over',
-        metavar='INPUT',
-        help='input of a sweep, of several; the others are held as in the last --at, else as they '
-        'are drawn',
-    )
+    add_over(parser, 'input of a sweep, of several')
     parser.add_argument(
         '--from',
         dest='first',
@@ -176,21 +173,6 @@ def _forward_table(
 def _is_swept(arguments: argparse.Namespace) -> bool:
     ends = arguments.over, arguments.first, arguments.last
     return arguments.sweep or any(given is not None for given in ends)
-
-
-def _swept_input(closure: Closure, named: str | None) -> int:
-    """Return the number of the input of a sweep."""
-    names = closure.input_names
-    if named is None:
-        if len(names) > 1:
-            reason = f'there are {len(names)} inputs'
-            remedy = f'name one, as --over {names[0]}, or each state with --at'
-            raise LinkageError('--sweep', reason, remedy)
-        return 0
-    if named not in names:
-        remedy = did_you_mean(named, names, f'name {list_names(names)}')
-        raise LinkageError(f'--over {named}', 'is not an input', remedy)
-    return names.index(named)
 
 
 def _check_alone(arguments: argparse.Namespace) -> None:
@@ -354,9 +336,10 @@ def _read_question(
         *(read_inputs(linkage, at, '--at', arguments.angles) for at in arguments.at),
     ]
     if _is_swept(arguments) or not asked:
+        number = input_over(closure, arguments.over, '--sweep', 'each state with --at')
         held = asked[-1] if asked else usual_inputs(closure)
         asked += _sweep_inputs(
-            InputSweep(closure, held, _swept_input(closure, arguments.over)),
+            InputSweep(closure, held, number),
             arguments.first,
             arguments.last,
             arguments.steps,

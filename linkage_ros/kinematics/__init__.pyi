@@ -11,7 +11,10 @@
 # InputRange, SingularityMargin, RRRDyad, Driven, Structure.
 
 from linkage_ros.kinematics.analysis.carried_efforts import CarriedEfforts as CarriedEfforts
-from linkage_ros.kinematics.analysis.crank_branches import CrankBranch as CrankBranch
+from linkage_ros.kinematics.analysis.crank_branches import (
+    branches_over as branches_over,
+    CrankBranch as CrankBranch,
+)
 from linkage_ros.kinematics.analysis.curves import (
     Curve as Curve,
     drawn_once as drawn_once,

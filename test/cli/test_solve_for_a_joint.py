@@ -11,15 +11,18 @@
 from __future__ import annotations
 
 from cmath import phase, rect
+from collections.abc import Callable, Sequence
 import csv
 import io
-from math import acos, atan2, pi, radians, remainder, tau
+import json
+from math import acos, atan2, cos, pi, radians, remainder, sin, sqrt, tau
 from pathlib import Path
 from random import Random
 import re
 
 from linkage_ros import load
 from linkage_ros.cli.main import main
+import numpy as np
 import pytest
 
 from .conftest import Run
@@ -100,6 +103,108 @@ def test_solve_refuses_unreachable_values_of_joints(
             assert line.startswith(f'linkage solve: --joint {joints[0]}=')
             assert ': is not reached' in line
     assert 2 in seen
+
+
+def five_bar_foot(left: float, right: float) -> dict[str, float]:
+    """Return where the tip of the gallery's five-bar is, by two circles, and an elbow."""
+    a, b = rect(0.09, left), 0.12 + rect(0.09, right)
+    half = (a - b) / 2
+    foot = b + half - 1j * half * sqrt(0.11**2 / abs(half) ** 2 - 1)
+    return {'P.x': foot.real, 'P.y': foot.imag, 'left_elbow': phase((foot - a) / a)}
+
+
+def delta_platform(*angles: float) -> dict[str, float]:
+    """Return where the gallery's delta has its platform, below its knees: by three spheres."""
+    knees = []
+    for k, angle in enumerate(angles):
+        out = np.array([cos(tau * k / 3), sin(tau * k / 3), 0.0])
+        arm = 0.1 * cos(angle) - 0.15 * sin(angle), -0.1 * sin(angle) - 0.15 * cos(angle)
+        knees.append(out * (0.06 + arm[0]) + np.array([0.0, 0.0, arm[1]]))
+    sides = np.array(knees[1:]) - knees[0]
+    normal = np.cross(*sides)
+    middle, *_ = np.linalg.lstsq(
+        np.array([*sides, normal]), np.array([*(0.5 * (sides**2).sum(1)), 0.0]), rcond=None
+    )
+    up = normal / np.linalg.norm(normal)
+    place = knees[0] + middle - up * sqrt(0.16**2 + 0.35**2 - middle @ middle)
+    return dict(zip('xyz', map(float, place), strict=True))
+
+
+@pytest.mark.parametrize(
+    ('name', 'over', 'held', 'reference'),
+    [
+        ('five_bar', 'left_crank_joint', (0.3, 1.2), five_bar_foot),
+        ('five_bar', 'right_crank_joint', (1.4, 0.2), five_bar_foot),
+        ('delta', 'a2', (0.1, 0.0, -0.2), delta_platform),
+    ],
+)
+def test_branches_over_one_of_several_inputs(
+    name: str,
+    over: str,
+    held: Sequence[float],
+    reference: Callable[..., dict[str, float]],
+    linkage: Run,
+) -> None:
+    """On each branch the joint of a closed form moves one way, and turns back where it says."""
+    typed = ['--over', over, '--radians', '--at', *map(str, held)]
+    answer = json.loads(linkage('check', name, '--branches', *typed, '--json').stdout)
+    number = [given['joint'] for given in answer['inputs']].index(over)
+    names = {branch['joint'] for branch in answer['branches']}
+    assert {'five_bar': {'right_elbow', *five_bar_foot(1.0, 2.0)}, 'delta': {*'xyz'}}[
+        name
+    ] == names
+    for branch in answer['branches']:
+        if branch['joint'] == 'right_elbow':
+            continue
+        assert branch['held'] == {
+            given['joint']: value
+            for given, value in zip(answer['inputs'], held, strict=True)
+            if given['joint'] != over
+        }
+
+        def value_at(crank: float, joint: str = branch['joint']) -> float:
+            inputs = [crank if k == number else value for k, value in enumerate(held)]
+            return reference(*inputs)[joint]
+
+        low, high = branch['input_low'], branch['input_high']
+        width = high - low
+        inner = [low + width * (k + 0.5) / 200 for k in range(200)]
+        values = np.array([value_at(crank) for crank in inner])
+        steps = np.diff(np.unwrap(values) if branch['unit'] == 'rad' else values)
+        assert (steps > 0.0).all() if branch['rises'] else (steps < 0.0).all()
+        ends = [low, high] if branch['rises'] else [high, low]
+        for end, key, back in zip(ends, ('low', 'high'), branch['turns_back'], strict=True):
+            if back:
+                assert value_at(end) == pytest.approx(branch[key], abs=1e-12)
+                beside = [value_at(end + way * 1e-3 * width) for way in (-1, 1)]
+                assert (beside[0] - value_at(end)) * (beside[1] - value_at(end)) > 0.0
+
+
+@pytest.mark.parametrize(
+    ('typed', 'said'),
+    [
+        (
+            ['delta', '--branches'],
+            '--branches: there are 3 inputs; name one, as --over a1, or leave it out',
+        ),
+        (['delta', '--branches', '--over', 'b'], '--over b: is not an input; name a1, a2, a3'),
+        (['delta', '--over', 'a1'], '--over: says where branches are; write --branches too'),
+        (['delta', '--at', '0', '0', '0'], '--at: says where branches are; write --branches too'),
+        (
+            ['five_bar', '--branches', '--over', 'left_crank_joint', '--at', '0', '0', '0'],
+            '--at 0 0 0: 3 value(s) for 2 input(s); write --at LEFT_CRANK_JOINT RIGHT_CRANK_JOINT',
+        ),
+        (
+            ['wishbone', '--branches', '--over', 'travel', '--at', '0', '900'],
+            'travel: closes nowhere while the other inputs are held; hold them elsewhere, by --at',
+        ),
+    ],
+)
+def test_branches_refuse_what_names_no_way(
+    typed: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['check', *typed]) == 2
+    assert capsys.readouterr().err == f'linkage check: {said}\n'
 
 
 TANGENT = """

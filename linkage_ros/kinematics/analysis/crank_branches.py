@@ -26,10 +26,10 @@ compiled closed form; two steps are usual. So a crank depends on y and the branc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from math import atan2, ceil, floor, inf, isnan, nan, pi, remainder, sin, sqrt, tan, tau
-from typing import NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.analysis.monotonic_pieces import FARTHEST, monotonic_pieces
@@ -410,15 +410,25 @@ class OutputFunction:
     """
     An output over the crank, with its slope, both NaN where the linkage does not close.
 
-    ``compiled`` has all published joints; without it the output is compiled alone.
+    The crank is the input of ``sweep``. ``compiled`` has all published joints; without it the
+    output is compiled alone.
     """
 
-    def __init__(self, closure: Closure, output: Output, compiled: Compiled | None = None) -> None:
+    def __init__(
+        self,
+        closure: Closure,
+        output: Output,
+        sweep: InputSweep,
+        compiled: Compiled | None = None,
+    ) -> None:
         self._number = output.number if compiled else 0
         self._compiled = compiled or Compiled(closure, 1, output.wanted, within_limits=False)
-        self.fast = self._compiled.fast
+        self.fast: Callable[..., Any] = self._compiled.fast
+        self._interpret: Callable[..., Any] = self._compiled.run_interpreted
+        if len(closure.input_names) > 1:
+            self.fast, self._interpret = sweep.along(self.fast), sweep.along(self._interpret)
         self.turning = output.turning
-        self.crank_turns = not closure.linkage.inputs[0].slider
+        self.crank_turns = sweep.turning
         self.size = tau if output.turning else closure.scale
         """The size of numbers that it is a difference of, in its unit."""
 
@@ -426,7 +436,7 @@ class OutputFunction:
         """Return the output and its slope at a crank."""
         values = self.fast(crank, 1.0)
         if values is None:
-            values = self._compiled.run_interpreted(crank, 1.0).values
+            values = self._interpret(crank, 1.0).values
         value, slope = (group[self._number] if group else nan for group in values)
         return value, slope
 
@@ -437,15 +447,18 @@ def crank_branches(
     *,
     limited: bool = True,
     compiled: Compiled | None = None,
+    sweep: InputSweep | None = None,
 ) -> list[CrankBranch]:
     """
-    Return the branches of an output over a single input, by the crank at which they begin.
+    Return the branches of an output over one input, by the crank at which they begin.
 
     If ``limited``, limits of joints cut them. An output that does not move raises DefinitionError.
-    ``compiled`` is as in `OutputFunction`: then the branches do not look for cranks.
+    ``compiled`` is as in `OutputFunction`: then the branches do not look for cranks. ``sweep``
+    says which of several inputs moves.
     """
-    evaluate = OutputFunction(closure, output, compiled)
-    ranges = InputSweep(closure).ranges if limited else closure.closing_ranges
+    sweep = sweep or InputSweep(closure)
+    evaluate = OutputFunction(closure, output, sweep, compiled)
+    ranges = sweep.ranges if limited else closure.closing_ranges
     branches: list[CrankBranch] = []
     for interval in ranges:
         period = interval.highest - interval.lowest if interval.is_whole else 0.0
@@ -458,6 +471,12 @@ def crank_branches(
     if ranges and not branches:
         raise DefinitionError(output.name, 'does not move with the input', 'name another joint')
     return branches
+
+
+def branches_over(sweep: InputSweep, name: str) -> list[CrankBranch]:
+    """Return the branches of a joint, or of what is measured, over an input; others are held."""
+    closure = sweep.closure.measuring(name)
+    return crank_branches(closure, joint_output(closure, name), sweep=sweep)
 
 
 class Inverse(NamedTuple):

@@ -144,9 +144,23 @@ class InputSweep:
         self.input = closure.linkage.inputs[number]
         self.turning = not self.input.slider
 
+    @property
+    def held_inputs(self) -> dict[str, float]:
+        """Return the values of the inputs that are held."""
+        values = zip(self.closure.input_names, self.inputs_at(0.0), strict=True)
+        return {name: value for name, value in values if name != self.input.joint}
+
     def inputs_at(self, value: float) -> tuple[float, ...]:
         """Return the values of all inputs."""
         return *self._before, value, *self._after
+
+    def along(self, function: Callable[..., Any]) -> Callable[[float, float], Any]:
+        """Return a function of all inputs and their rates as one of this input and its rate."""
+        before, after = self._before, self._after
+        still_before, still_after = (0.0,) * len(before), (0.0,) * len(after)
+        return lambda value, rate: function(
+            *before, value, *after, *still_before, rate, *still_after
+        )
 
     def position_at(self, value: float) -> Position:
         """Return the position at a value of the input."""
