@@ -147,7 +147,7 @@ def _current_state(
         if reading is not None:
             rates = reading.rates or [None] * len(reading.joints)
             values += zip(scene_linkage.joint_names, reading.joints, rates, strict=True)
-    return age, [_shown_joint(*each, turning[each[0]], units) for each in values[:_MOST_SHOWN]]
+    return age, [_shown_joint(*joint, turning[joint[0]], units) for joint in values[:_MOST_SHOWN]]
 
 
 def _shown_joint(
