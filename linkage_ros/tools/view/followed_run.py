@@ -113,11 +113,11 @@ class FollowedRun(NamedTuple):
             places = spatial_places(self.drawing, inputs)[0]
             return places.ravel().tolist() if np.isfinite(places).all() else None
         assert isinstance(self.closure, PlanarClosure)
-        found = link_poses(self.closure, self.drawn_linkage.prefix, values, input_names)
-        if not set(self.model['links']) <= set(found.links):
+        poses = link_poses(self.closure, self.drawn_linkage.prefix, values, input_names)
+        if not set(self.model['links']) <= set(poses.links):
             return None
-        order = [found.links.index(link) for link in self.model['links']]
-        frames = found.frames[0][order]
+        order = [poses.links.index(link) for link in self.model['links']]
+        frames = poses.frames[0][order]
         return frames.ravel().tolist() if np.isfinite(frames).all() else None
 
 
@@ -136,7 +136,7 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
         drawing = SpaceDrawing(closure) if isinstance(closure, SpaceClosure) else None
     except (ValueError, ArithmeticError, MalformedError) as error:
         raise LinkageError(topic, f'is not valid: {quote(str(error))}', 'name another') from None
-    turned = next((each for each in scene.linkages if each.drive[0] in _BY_TOPIC), None)
+    turned = next((linkage for linkage in scene.linkages if linkage.drive[0] in _BY_TOPIC), None)
     if not account.crank_topic:
         turned = None
     model |= {'live': _live_model(scene, closure, turned)}
@@ -186,14 +186,17 @@ def _ground_cranks(closure: PlanarClosure) -> Iterator[list[float] | None]:
 def diagnostics_content(statuses: Sequence[DiagnosticStatus]) -> dict[str, Any]:
     """Return what the newest diagnostics say of a node, as a page gets it."""
     values = {
-        _task_name(status): {each.key: each.value for each in status.values} for status in statuses
+        _task_name(status): {value.key: value.value for value in status.values}
+        for status in statuses
     }
     tick, recording = values.get('tick', {}), values.get('recording', {})
     return {
         'ticks': tick.get('Actual frequency (Hz)', ''),
         'late': tick.get('Late by more than a period', ''),
         'lost': tick.get('Lost ticks', ''),
-        'lateness': [tick.get(f'Lateness {each} (us)', '') for each in ('p50', 'p99', 'max')],
+        'lateness': [
+            tick.get(f'Lateness {quantity} (us)', '') for quantity in ('p50', 'p99', 'max')
+        ],
         'diagnostics': [
             [status.level[0], f'{_task_name(status)}: {status.message}'] for status in statuses
         ],
