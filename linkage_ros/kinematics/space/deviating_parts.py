@@ -9,8 +9,8 @@
 """
 A spatial linkage of parts that are not as drawn, put together at the inputs of the pose.
 
-Each link is a part with its own holes. Where these deviate, the links meet elsewhere than in the
-pose: each moves by a small displacement and turn, until points and axes coincide again, by
+Each link is a part with its own holes and axes. Where these deviate, the links meet elsewhere than
+in the pose: each moves by a small displacement and turn, until points and axes coincide again, by
 Newton's method on all equations, with the least motion where links are free (the spin of a rod).
 The drawn zeros of the joints stay on their parts, so the values of the joints in the pose change;
 driven joints keep theirs, and ratios hold.
@@ -18,9 +18,10 @@ driven joints keep theirs, and ratios hold.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import atan2
+from math import atan2, hypot
+from types import MappingProxyType
 from typing import Any
 
 from linkage_ros.errors import DefinitionError
@@ -28,7 +29,7 @@ from linkage_ros.kinematics.plane.linkage import GROUND
 from linkage_ros.kinematics.space.carried_points import unit_across
 from linkage_ros.kinematics.space.linkage import size_of, SpaceLinkage, SpatialJoint
 from linkage_ros.kinematics.space.masses import SpatialMass, turned_tensor
-from linkage_ros.kinematics.space.vectors import Vector
+from linkage_ros.kinematics.space.vectors import turn_about, Vector
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,7 +46,9 @@ _MISSED = 1e-9
 
 
 def put_together(
-    linkage: SpaceLinkage, deviations: Mapping[tuple[str, str], Vector]
+    linkage: SpaceLinkage,
+    deviations: Mapping[tuple[str, str], Vector],
+    tilts: Mapping[tuple[str, str], tuple[float, float]] = MappingProxyType({}),
 ) -> SpaceLinkage:
     """
     Return a linkage of parts that deviate.
@@ -57,6 +60,9 @@ def put_together(
     deviations
         For link and point, or link and hinge, how far the hole is from the drawn one, in [m],
         along the axes of the ground in the pose.
+    tilts
+        For link and hinge, the turn of the axis from the drawn one, in [rad]: about `unit_across`
+        of the axis, and about the direction across both.
 
     Raises
     ------
@@ -64,7 +70,7 @@ def put_together(
         The parts cannot be put together.
 
     """
-    parts = _DeviatingParts(linkage, deviations)
+    parts = _DeviatingParts(linkage, deviations, tilts)
     size = size_of(linkage)
     for _ in range(_MOST_STEPS):
         errors, slopes = parts.equations()
@@ -82,13 +88,41 @@ def put_together(
     return parts.as_linkage()
 
 
+def _directions(joint: SpatialJoint) -> Vectors:
+    """Return directions across, across and along the axis of a joint as drawn."""
+    along = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    one = np.array(unit_across((along[0], along[1], along[2])))
+    return np.array([one, np.cross(along, one), along])
+
+
+def _tilt(hinge: SpatialJoint, angles: Sequence[float]) -> Vectors:
+    """Return the rotation by small angles about both directions across an axis."""
+    angle = hypot(*angles)
+    if not angle:
+        return np.eye(3)
+    x, y, z = (np.array(angles) / angle @ _directions(hinge)[:2]).tolist()
+    return np.array([turn_about((x, y, z), angle, (i, j, k)) for i, j, k in np.eye(3)]).T
+
+
 class _DeviatingParts:
     """The links of a linkage, each moved from where it is drawn."""
 
     def __init__(
-        self, linkage: SpaceLinkage, deviations: Mapping[tuple[str, str], Vector]
+        self,
+        linkage: SpaceLinkage,
+        deviations: Mapping[tuple[str, str], Vector],
+        tilts: Mapping[tuple[str, str], tuple[float, float]],
     ) -> None:
         self._linkage = linkage
+        self._tilts = {
+            (link, hinge): _tilt(linkage.hinges[hinge], angles)
+            for (link, hinge), angles in tilts.items()
+        }
+        # For points on the axis of a hinge, on both of its links: the hinge.
+        self._on_axes: dict[tuple[str, str], str] = {}
+        for point, *ends in linkage.shared_points(on_axes=True):
+            pairs = {frozenset((h.parent, h.child)): name for name, h in linkage.hinges.items()}
+            self._on_axes |= {(link, point): pairs[frozenset(ends)] for link in ends}
         self._deviations = deviations
         self._links = linkage.link_names[1:]
         self._carriers: dict[str, list[str]] = {name: [] for name in linkage.points}
@@ -111,6 +145,11 @@ class _DeviatingParts:
         self._size = size_of(linkage)
 
     def _place(self, link: str, name: str, drawn: Vector) -> Vectors:
+        if (link, name) in self._on_axes:
+            hinge = self._on_axes[link, name]
+            at = self._linkage.hinges[hinge].at
+            along = self._turn_of(link, hinge) @ np.subtract(drawn, at)
+            return np.asarray(self._place(link, hinge, at) + along)
         off = np.array(self._deviations.get((link, name), (0.0, 0.0, 0.0)))
         arm = np.array(drawn) + off - self._middles[link]
         return np.asarray(self._origins[link] + self._turns[link] @ arm)
@@ -167,12 +206,18 @@ class _DeviatingParts:
             for way in np.eye(3):
                 yield self._distance_along(one, other, places, way)
 
-    def _axes(self, joint: SpatialJoint) -> tuple[Vectors, Vectors]:
+    def _axes(self, name: str) -> tuple[Vectors, Vectors]:
         """Return across, across and along a joint's axis: the directions on parent and child."""
-        along = np.array(joint.axis) / np.linalg.norm(joint.axis)
-        one = np.array(unit_across((along[0], along[1], along[2])))
-        drawn = np.array([one, np.cross(along, one), along])
-        return drawn @ self._turns[joint.parent].T, drawn @ self._turns[joint.child].T
+        joint = self._linkage.pair_joints[name]
+        drawn = _directions(joint)
+        on_parent, on_child = (
+            drawn @ self._turn_of(link, name).T for link in (joint.parent, joint.child)
+        )
+        return on_parent, on_child
+
+    def _turn_of(self, link: str, joint: str) -> Vectors:
+        """Return the turn of a joint's directions on a link, from where they are drawn."""
+        return self._turns[link] @ self._tilts.get((link, joint), np.eye(3))
 
     def _right_angle_error(
         self, joint: SpatialJoint, on_parent: Vectors, on_child: Vectors
@@ -188,13 +233,13 @@ class _DeviatingParts:
         """Yield by how much joints turn or move where they may not, or are driven."""
         driven = self._linkage.driven
         for name, joint in self._linkage.pair_joints.items():
-            (one, two, _), (_, other, along) = self._axes(joint)
+            (one, two, _), (_, other, along) = self._axes(name)
             yield self._right_angle_error(joint, one, along)
             yield self._right_angle_error(joint, two, along)
             if name in self._linkage.slides or name in driven:
                 yield self._right_angle_error(joint, one, other)
             if name in self._linkage.slides:
-                ways = self._axes(joint)[0]
+                ways = self._axes(name)[0]
                 for way in ways if name in driven else ways[:2]:
                     yield self._slide_motion(joint, way)
 
@@ -211,7 +256,7 @@ class _DeviatingParts:
     def _joint_motion(self, name: str) -> Any:
         """Return how far a joint is from its value in the drawn pose, with its slopes."""
         joint = self._linkage.pair_joints[name]
-        on_parent, on_child = self._axes(joint)
+        on_parent, on_child = self._axes(name)
         if name in self._linkage.slides:
             return self._slide_motion(joint, on_parent[2])
         angle = atan2(on_child[0] @ on_parent[1], on_child[0] @ on_parent[0])
@@ -246,7 +291,7 @@ class _DeviatingParts:
 
         def put_joint(joint: SpatialJoint, name: str) -> SpatialJoint:
             moved, _ = self._joint_motion(name)
-            x, y, z = (self._turns[joint.parent] @ np.array(joint.axis)).tolist()
+            x, y, z = (self._turn_of(joint.parent, name) @ np.array(joint.axis)).tolist()
             value = joint.value if name in linkage.driven else joint.value + float(moved)
             placed = replace(joint, axis=(x, y, z), value=value)
             if name in linkage.slides:

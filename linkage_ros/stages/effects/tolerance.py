@@ -25,14 +25,16 @@ of the normal distribution before truncation is larger by a factor w, with c = 3
 Guide to the expression of uncertainty in measurement, 4.3.
 
 In space the holes are points and the places of hinges, on both links; those of hinges that meet in
-one place do not deviate, nor do directions. The parts are put together anew at the inputs of the
-pose, see `linkage_ros.kinematics.space.deviating_parts`. Where a linkage has more equations than
-it needs, as with parallel axes, parts that deviate may not fit, which is an error.
+one place do not deviate, nor do directions of slides. The axis of a hinge deviates on each of its
+links by angles about two directions across it; so do axes that meet in one place, whose angles are
+the dimensions of a spherical linkage. The parts are put together anew at the inputs of the pose,
+see `linkage_ros.kinematics.space.deviating_parts`. Where a linkage has more equations than it
+needs, as with parallel axes, parts that deviate may not fit, which is an error.
 
 All coordinates are drawn, link by link and point by point in the order of the linkage file, x
-before y and z, and then scaled. So neither the deviation nor the choice of links changes the draws
-of the others, and a doubled deviation gives the same mechanism with doubled errors. The direction
-of a slider does not deviate.
+before y and z, then the angles hinge by hinge, those on the parent first; and then scaled. So
+neither the deviation nor the choice of links changes the draws of the others, and a doubled
+deviation gives the same mechanism with doubled errors. The direction of a slider does not deviate.
 
 The altered linkage stays on the branch of the one in the file: where that passes a change point,
 it changes its side too, although its own lengths make none.
@@ -60,7 +62,7 @@ BEFORE = 1.0153869850528114
 """w: standard deviation before truncation that gives 1 after it."""
 
 _KEY = 'effects.tolerance'
-_FARTHEST = 1e9
+_FARTHEST, _FARTHEST_TURN = 1e9, 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,14 @@ class ToleranceEffect(LinkageEffect):
         unit='m',
         least=0.0,
         most=_FARTHEST,
+    )
+    axis_standard_deviation: float = number(
+        'in space: of the angle of the axis of each hinge on each of its links, about both '
+        'directions across it; likewise',
+        0.0,
+        unit='rad',
+        least=0.0,
+        most=_FARTHEST_TURN,
     )
     links: tuple[str, ...] = part_names(
         'links with such deviations, which may include the ground', 'body'
@@ -95,13 +105,24 @@ class ToleranceEffect(LinkageEffect):
 
             holes = linkage.holes
             deviations: Any = {hole: self._deviation_of(hole, 3, random) for hole in holes}
-            if not any(map(any, deviations.values())):
+            tilts: Any = {
+                (link, name): self._draw(link, 2, self.axis_standard_deviation, random)
+                for name, hinge in linkage.hinges.items()
+                for link in (hinge.parent, hinge.child)
+            }
+            if not any(map(any, (*deviations.values(), *tilts.values()))):
                 return linkage
             try:
-                altered = put_together(linkage, deviations)
+                altered = put_together(linkage, deviations, tilts)
             except DefinitionError as error:
-                raise _closing_error(error) from None
+                raise _closing_error(error, error.remedy) from None
         else:
+            if self.axis_standard_deviation:
+                raise DefinitionError(
+                    f'{_KEY}.axis_standard_deviation',
+                    'the axes of a planar linkage are parallel',
+                    'leave it out, or describe the linkage in space',
+                )
             links = {}
             for link, points in linkage.links.items():
                 made = {}
@@ -115,10 +136,14 @@ class ToleranceEffect(LinkageEffect):
 
     def _deviation_of(self, hole: tuple[str, str], axes: int, random: Random) -> tuple[float, ...]:
         """Return by how much a hole deviates; each is drawn, whether it is wanted or not."""
-        is_wanted = not self.links or hole[0] in self.links
-        scale = self.standard_deviation if is_wanted else 0.0
-        drawn = tuple(scale * _draw_deviation(random) for _ in range(axes))
+        drawn = self._draw(hole[0], axes, self.standard_deviation, random)
         return self.given.get('.'.join(hole), drawn)
+
+    def _draw(
+        self, link: str, count: int, standard_deviation: float, random: Random
+    ) -> tuple[float, ...]:
+        scale = standard_deviation if not self.links or link in self.links else 0.0
+        return tuple(scale * _draw_deviation(random) for _ in range(count))
 
 
 def _draw_deviation(random: Random) -> float:
@@ -139,10 +164,12 @@ def _check_closes(linkage: Linkage | SpaceLinkage) -> None:
     raise _closing_error(DefinitionError('', 'at no value of the input', ''))
 
 
-def _closing_error(error: DefinitionError) -> DefinitionError:
+def _closing_error(
+    error: DefinitionError, remedy: str = 'let it deviate less, or by another seed'
+) -> DefinitionError:
     reason = f'{error.where}: {error.reason}' if error.where else error.reason
     return DefinitionError(
         _KEY,
         f'with its deviations the linkage does not close: {reason}',
-        'let it deviate less, or by another seed',
+        remedy,
     )
