@@ -157,7 +157,7 @@ class JointMatrix:
 
         It takes the numbers of `varying_at`, then the right sides one after the other. It returns
         the solutions, or what ``select`` makes of them, as one sequence; None if the system is
-        singular.
+        singular. Given symbols, it becomes part of the program that is traced.
         """
         count = len(self._where)
 
@@ -175,6 +175,8 @@ class JointMatrix:
         line = compile_function(solve, count + number * self.size)
 
         def find_solution(*numbers: float) -> Sequence[float] | None:
+            if any(hasattr(number, 'apply') for number in numbers):
+                return solve(*numbers)
             found = line(*numbers)
             return found[0] if found and all(map(isfinite, found[0])) else None
 

@@ -33,11 +33,11 @@ from collections.abc import Callable, Sequence
 from functools import cached_property, partial, reduce
 from itertools import islice
 from math import hypot
-from operator import add, mul
+from operator import add, mul, sub
 from typing import Any, NamedTuple
 
 from linkage_ros.dynamics.joint_matrix import compile_function, JointMatrix, split_numbers
-from linkage_ros.kinematics import Elimination, make_vector, where
+from linkage_ros.kinematics import make_vector, where
 
 _MOST_STEPS = 48
 """Most steps of Newton's method."""
@@ -54,20 +54,22 @@ class FrictionSolver:
     Finds the friction in joints by their forces.
 
     ``unknowns`` are the joints; their factor is µ·ρ, in [m], or µ. ``sides`` is the number of
-    right sides of `forces_in`, and ``steps`` that of Newton's steps from one test to the next.
+    right sides of `forces_in`, and ``steps`` that of Newton's steps from one test to the next:
+    three are usual.
     """
 
     def __init__(
-        self, unknowns: Sequence[Unknown], matrix: JointMatrix, sides: int, steps: int = 4
+        self, unknowns: Sequence[Unknown], matrix: JointMatrix, sides: int, steps: int
     ) -> None:
         self._unknowns, self._steps = unknowns, steps
         self._matrix = matrix
         self._sides = sides
         self._count = len(unknowns)
-        # Of each joint x and y of F₀, F₁ and each P_k; |ψ'| of each; the pull and the mobility.
+
+    @cached_property
+    def _improve(self) -> Callable[..., Sequence[Sequence[float]] | None]:
         count = self._count
-        self._begin = compile_function(self._begin_forces, 2 * count * (count + 2) + count + 2)
-        self._improve = compile_function(self._improve_frictions, count * (3 + 2 * count))
+        return compile_function(self._improve_frictions, count * (3 + 2 * count))
 
     @cached_property
     def forces_in(self) -> Callable[..., Sequence[float] | None]:
@@ -100,44 +102,52 @@ class FrictionSolver:
         if flat is None:
             return None
         free, *units = split_numbers(flat, len(self._matrix.columns))
-        nothing = [0.0] * len(free)
-        forces = self._joint_forces([free, nothing, *units])
-        found = self.solve_frictions(forces, [0.0] * self._count, 0.0)
+        found = self.solve_by_forces(self._joint_forces([free, *units]))
         if found is None:
             return None
         for friction, unit in zip(found, units, strict=True):
             free = [force + friction * more for force, more in zip(free, unit, strict=True)]
         return [*free, *found]
 
-    def friction_effort(
-        self, forces: Sequence[float], levers: Sequence[float], pull: float, mobility: float
-    ) -> float | None:
-        """
-        Return the friction effort at the input, in [N·m] or [N]; None if the linkage jams.
-
-        The parameters are as in `solve_frictions`.
-        """
-        found = self.solve_frictions(forces, levers, pull, mobility)
-        if found is None:
-            return None
-        return sum([lever * friction for lever, friction in zip(levers, found, strict=True)])
-
-    def solve_frictions(
+    def improve_sliding(
         self,
-        forces: Sequence[float],
-        levers: Sequence[float],
-        pull: float,
-        mobility: float = 0.0,
-    ) -> Sequence[float] | None:
+        forces: Sequence[Any],
+        levers: Sequence[Any],
+        motion: Sequence[Any],
+        found: Sequence[Any],
+    ) -> list[list[Any]]:
         """
-        Return the friction in each joint, in [N·m] or [N]; None if the linkage jams.
+        Return better frictions where the only input slides, to be tested by `find_sliding`.
 
         ``forces`` are as in `forces_in`, for F₀, F₁ and the P_k; ``levers`` are |ψ'| of each
-        joint. ``pull`` is q̈ without this friction, in [rad/s²] or [m/s²]. ``mobility`` says how
-        much q̈ falls with a unit of this friction at the input: sign(q̇)/I; 0 if q̈ is given.
+        joint. ``motion`` is the pull and the mobility: q̈ without this friction, in [rad/s²] or
+        [m/s²], and how much it falls with a unit of this friction at the input: sign(q̇)/I; 0 if
+        q̈ is given. ``found`` are the frictions of the step before.
         """
-        (numbers,), count = self._begin(*forces, *levers, pull, mobility), self._count
-        return self._iterate(numbers[:count], numbers[count:])
+        numbers, count = self._begin_forces(*forces, *levers, *motion), self._count
+        improved = self._improve_frictions(*found, *numbers[count:])
+        if not improved:
+            return []
+        effort = _sum_products(levers, improved)
+        return [improved[:count], improved[count:], numbers[:count], [effort]]
+
+    def find_sliding(
+        self, improve: Callable[[Sequence[float]], Sequence[Sequence[float]] | None]
+    ) -> float | None:
+        """
+        Return the friction effort at the only input, in [N·m] or [N]; None if the linkage jams.
+
+        ``improve`` returns the results of `improve_sliding` from the frictions of a step before.
+        """
+        found: Sequence[float] = (0.0,) * self._count
+        for _ in range(_MOST_STEPS // self._steps):
+            improved = improve(found)
+            if not improved:
+                return None
+            found, missing, sizes, (effort,) = improved
+            if _stays(found, missing, sizes):
+                return effort
+        return None
 
     @property
     def factors(self) -> list[float]:
@@ -212,11 +222,7 @@ class FrictionSolver:
                 return None
             (numbers,) = improved
             found, missing = numbers[:count], numbers[count:]
-            for friction, left, size in zip(found, missing, sizes, strict=True):
-                # Not a number: no force is that great.
-                if not abs(left) <= size + _STAYS * abs(friction):
-                    break
-            else:
+            if _stays(found, missing, sizes):
                 return found
         return None
 
@@ -244,10 +250,9 @@ class FrictionSolver:
         found, forces = [*numbers[:count]], numbers[count:]
         for _ in range(self._steps):
             missing, slopes = self._missing(found, forces)
-            elimination = Elimination(slopes, ())
-            if any(divisor == 0.0 for divisor in elimination.divisors):
+            steps = _solve_dominant(slopes, missing)
+            if not steps:
                 return []
-            steps = elimination.solve(missing)
             found = [now + step for now, step in zip(found, steps, strict=True)]
         missing, _ = self._missing(found, forces)
         return [*found, *missing]
@@ -269,6 +274,41 @@ class FrictionSolver:
             falls = [along * (x * units[2 * k] + y * units[2 * k + 1]) for k in range(count)]
             slopes.append([float(i == k) - fall for k, fall in enumerate(falls)])
         return missing, slopes
+
+
+def _stays(found: Sequence[float], missing: Sequence[float], sizes: Sequence[float]) -> bool:
+    """Return whether what is missing of frictions is rounding."""
+    for friction, left, size in zip(found, missing, sizes, strict=True):
+        # Not a number: no force is that great.
+        if not abs(left) <= size + _STAYS * abs(friction):
+            return False
+    return True
+
+
+def _solve_dominant(matrix: Sequence[Sequence[Any]], right: Sequence[Any]) -> list[Any]:
+    """
+    Return the solution of equations whose diagonal dominates; none if a divisor is 0.
+
+    No rows are exchanged: frictions are small beside the forces that cause them, and where
+    they are not, the next Newton step corrects what digits are lost.
+    """
+    rows = [[*row, side] for row, side in zip(matrix, right, strict=True)]
+    for k, row in enumerate(rows):
+        if row[k] == 0.0:
+            return []
+        after = k + 1
+        for other in rows[after:]:
+            factor = other[k] / row[k]
+            other[after:] = [
+                entry - factor * pivot
+                for entry, pivot in zip(other[after:], row[after:], strict=True)
+            ]
+    solution: list[Any] = []
+    for k, row in reversed([*enumerate(rows)]):
+        *entries, side = row[k + 1 :]
+        total = reduce(sub, map(mul, entries, solution), side)
+        solution.insert(0, total / row[k])
+    return solution
 
 
 def _sum_products(one: Sequence[Any], other: Sequence[Any]) -> Any:

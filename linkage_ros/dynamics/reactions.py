@@ -312,20 +312,25 @@ class Reactions:
         The result is in [N·m] or [N]; None where the linkage jams, or has no forces. ``value`` and
         ``rate`` of the input are in [rad] or [m] and per second; the rate is not 0. ``seconds`` is
         the time since the first tick, ``pull`` and ``mobility`` are as in
-        `linkage_ros.dynamics.load_dependent_friction.solve_frictions`.
+        `linkage_ros.dynamics.load_dependent_friction.FrictionSolver.improve_sliding`.
         """
-        closure, applied = self._mechanics.closure, self._mechanics.applied
+        applied = self._mechanics.applied
         given = () if applied is None else applied.given_after(seconds)
-        found: Sequence[Sequence[float]] | None = self._compiled_motion.fast(value, rate, *given)
-        if found is None:
-            position = closure.position(value)
-            if position.status not in _SOLVED:
-                return None
-            found = self._force_coefficients(position, closure.velocity(position, rate), given)
-        if not found:
-            return None
-        forces, levers = found
-        return self._frictions.friction_effort(forces, levers, pull, mobility)
+        fast = self._compiled_sliding.fast
+
+        def improve_frictions(found: Sequence[float]) -> Sequence[Sequence[float]] | None:
+            numbers = (*given, pull, mobility, *found)
+            improved: Sequence[Sequence[float]] | None = fast(value, rate, *numbers)
+            if improved is None:
+                closure = self._mechanics.closure
+                position = closure.position(value)
+                if position.status not in _SOLVED:
+                    return None
+                velocity = closure.velocity(position, rate)
+                improved = self._improve_sliding(position, velocity, numbers)
+            return improved
+
+        return self._frictions.find_sliding(improve_frictions)
 
     @property
     def pressing(self) -> Pressing:
@@ -466,8 +471,8 @@ class Reactions:
         sides, count = 2 + len(unknowns), len(mechanics.closure.input_names)
         if count > 1:
             sides = 1 + count + len(mechanics.dry_joints) + len(mechanics.stopped_joints)
-        # Several inputs test each step: three are usual.
-        return FrictionSolver(unknowns, self._matrix, sides, 4 if count == 1 else 1)
+        # Several inputs test each step.
+        return FrictionSolver(unknowns, self._matrix, sides, 3 if count == 1 else 1)
 
     @cached_property
     def _solve_forces(self) -> Callable[..., Sequence[float] | None]:
@@ -478,32 +483,40 @@ class Reactions:
         return self._matrix.compile_solver(transposed=True)
 
     @cached_property
-    def _compiled_motion(self) -> Compiled:
+    def _compiled_sliding(self) -> Compiled:
         def list_outputs(motion: CompiledMotion, *given: float) -> Sequence[Sequence[float]]:
             assert motion.velocity is not None
-            return self._force_coefficients(motion.position, motion.velocity, given)
+            return self._improve_sliding(motion.position, motion.velocity, given)
 
         applied = self._mechanics.applied
         count = 0 if applied is None else len(applied.given_after(0.0))
+        count += 2 + len(self._load_dependent)
         return Compiled(
             self._mechanics.closure, 1, list_outputs, within_limits=False, given_count=count
         )
 
-    def _force_coefficients(
-        self, position: Position, velocity: Velocity, given: Sequence[float]
+    def _improve_sliding(
+        self, position: Position, velocity: Velocity, numbers: Sequence[float]
     ) -> Sequence[Sequence[float]]:
-        """Return the coefficients of the forces that cause friction, and the levers of joints."""
+        """
+        Return better frictions by the forces at a motion, as `FrictionSolver.improve_sliding`.
+
+        ``numbers`` are those of applied forces, pull and mobility, then the last frictions.
+        """
         closure, places = self._mechanics.closure, self._follower.places(position)
+        begin = len(numbers) - len(self._load_dependent)
+        given, found = numbers[: begin - 2], numbers[begin:]
         columns, units = self._sides_by_accelerations(position, velocity, places, given)
-        numbers = self._matrix.varying_at(position, places)
-        forces = call(self._frictions.forces_in, *numbers, *columns, *units)
-        if not has_result(forces):
+        forces = self._frictions.forces_in(
+            *self._matrix.varying_at(position, places), *columns, *units
+        )
+        if not forces:
             return []
         v = velocity.state.coordinates
         unit = self._scale if closure.linkage.inputs[0].slider else 1.0
         levers = [abs(rubbing.slip_rate(v) / (unit * v[1])) for rubbing in self._load_dependent]
-        count = 2 * len(self._load_dependent) * (len(self._load_dependent) + 2)
-        return [[forces[i] for i in range(count)], levers]
+        motion = numbers[begin - 2 : begin]
+        return self._frictions.improve_sliding(forces, levers, motion, found)
 
     def _sides_by_accelerations(
         self,
