@@ -205,7 +205,7 @@ class JointStateWriter(ArrayWriter):
         """Return `write` as generated lines that make ``message`` from expressions."""
         arrays = {'positions': positions, 'rates': rates, 'efforts': efforts}
         call = self.message_expression(
-            {name: ', '.join(given) for name, given in arrays.items() if given}
+            {name: ', '.join(values) for name, values in arrays.items() if values}
         )
         lines = [f'seconds, nanoseconds = divmod({stamp}, {NANOSECONDS})']
         return Lines([*lines, f'message = {call.lines[0]}'], call.bound)
@@ -311,7 +311,7 @@ class JointEffortReader:
                     efforts = pick(values)
                     if len(efforts) < len(named):
                         left = iter(efforts)
-                        efforts = tuple([next(left) if one else None for one in named])
+                        efforts = tuple([next(left) if has_value else None for has_value in named])
                     return EffortCommand(values[1] * NANOSECONDS + values[2], efforts)
         layout = _effort_pattern(data, self._joints, self._dependent)
         if isinstance(layout, Rejection):

@@ -103,7 +103,7 @@ class MarkerArrayWriter:
 
     def __init__(self, frame: str, markers: Sequence[Marker]) -> None:
         message = pack_message(
-            MARKER_ARRAY, {'markers': [_field_values(frame, one) for one in markers]}
+            MARKER_ARRAY, {'markers': [_field_values(frame, marker) for marker in markers]}
         )
         self._buffer = bytearray(message)
         self._widths = [marker.scale[:2] for marker in markers]
@@ -140,7 +140,9 @@ class MarkerArrayWriter:
         above = length + z if z > 0.0 else across * across / ((length - z) or 1.0)
         turn = (-y, x, 0.0, above) if across or z > 0.0 else (1.0, 0.0, 0.0, 0.0)
         turned = hypot(*turn)
-        _POSE.pack_into(self._buffer, where['pose'], *middle, *(one / turned for one in turn))
+        _POSE.pack_into(
+            self._buffer, where['pose'], *middle, *(component / turned for component in turn)
+        )
         _XYZ.pack_into(self._buffer, where['scale'], *self._widths[number], length)
 
     def colour_marker(self, number: int, colour: Colour) -> None:
