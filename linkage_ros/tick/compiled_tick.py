@@ -63,14 +63,14 @@ def compile_tick(interpreted: InterpretedTick) -> Callable[[int], Tick] | None:
     if not any(compiled):
         return None
     pairs = zip(linkages, compiled, strict=True)
-    whole = [one for linkage, one in pairs if one is not None and _is_whole(linkage)]
+    whole = [program for linkage, program in pairs if program is not None and _is_whole(linkage)]
     if len(whole) == len(linkages) == 1:
         return _compile_single(interpreted, whole[0])
     if len(whole) == len(linkages) and not interpreted.extras:
         return _combine_ticks(interpreted, whole)
     computes = [
-        linkage.interpret if one is None else _compile_state(linkage, one)
-        for linkage, one in zip(linkages, compiled, strict=True)
+        linkage.interpret if program is None else _compile_state(linkage, program)
+        for linkage, program in zip(linkages, compiled, strict=True)
     ]
     return lambda now: interpreted.make_tick(now, [compute(now) for compute in computes])
 
@@ -90,7 +90,7 @@ def _compile_state(
 def _is_whole(linkage: LinkagePipeline) -> bool:
     """Return whether sensors and messages of a linkage take nothing that is interpreted."""
     return (
-        all(one.writer.of_reading or one.forces_only for one in linkage.extras)
+        all(extra.writer.of_reading or extra.forces_only for extra in linkage.extras)
         and linkage.apply_later_sensors is None
     )
 
@@ -179,12 +179,12 @@ class _OutputSelection:
     key: list[Any]
     linkage: LinkagePipeline = field(compare=False)
 
-    def __call__(self, motion: TracedMotion, *given: float) -> Sequence[Sequence[float]]:
+    def __call__(self, motion: TracedMotion, *loads: float) -> Sequence[Sequence[float]]:
         """Return the ideal reading of a symbolic motion, and the joint forces."""
         acceleration = motion.acceleration
         if acceleration is None or not all_finite(acceleration.joints):
             return []
-        moved = MechanismState(CrankState((), (), (), 0), *motion, (), (), (), given)
+        moved = MechanismState(CrankState((), (), (), 0), *motion, (), (), (), loads)
         _velocity, _acceleration, *stages = self.linkage.mechanism_stages
         for stage in stages:
             moved = stage(moved)
@@ -196,12 +196,12 @@ def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
     """Compile the tick of a linkage up to the reading; None where a part has no such form."""
     wanted = linkage.wanted
     acting = wanted.of_kind(MechanismEffect).values()
-    derivatives = [each.derivative for each in acting if each.derivative]
+    derivatives = [effect.derivative for effect in acting if effect.derivative]
     if linkage.mechanism_faults:
         return None
-    if not all(each.is_compiled for each in acting):
+    if not all(effect.is_compiled for effect in acting):
         return None
-    loads = linkage.changing_loads if any(each.computes_forces for each in acting) else None
+    loads = linkage.changing_loads if any(effect.computes_forces for effect in acting) else None
     efforts_taken = len(linkage.drive.efforts) if linkage.context.takes_efforts else 0
     outputs = None
     if 2 in derivatives:
@@ -248,24 +248,24 @@ def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
         bound['running'] = linkage.running
         lines += _unwrap_lines(linkage.running.places, joints, leave)
     crank = 'crank' if exerts else f'({_CRANK_FIELDS})'
-    given = '()' if loads is None and not efforts_taken else 'given'
+    load_values = '()' if loads is None and not efforts_taken else 'given'
     reading = joints, rates, accelerations, efforts
-    each = len(reactions) // len(linkage.context.reactions.joints) if reactions else 1
-    wrenches = [*zip(*[iter(reactions)] * each, strict=True)]
-    return CompiledTick(lines, bound, crank, given, *reading, wrenches)
+    components = len(reactions) // len(linkage.context.reactions.joints) if reactions else 1
+    wrenches = [*zip(*[iter(reactions)] * components, strict=True)]
+    return CompiledTick(lines, bound, crank, load_values, *reading, wrenches)
 
 
 def _mechanism_lines(compiled_linkage: Compiled, leave: str) -> tuple[Lines, list[list[str]]]:
     """Write the motion of a compiled linkage; also return the names of its values, in groups."""
     path, *more_paths = compiled_linkage.paths
-    inputs = [one.name for one in path.inputs]
+    inputs = [value.name for value in path.inputs]
     names = iter(inputs)
     lines = [
         f'{", ".join(islice(names, compiled_linkage.driven))}, = {field}'
         for field in CrankState._fields[: 1 + compiled_linkage.derivatives]
     ]
-    if beside := [*names]:
-        lines.append(f'{", ".join(beside)}, = given')
+    if load_names := [*names]:
+        lines.append(f'{", ".join(load_names)}, = given')
     groups = [
         [f'{letter}{i}' for i in range(len(group))]
         for letter, group in zip('xyzef', path.outputs, strict=False)

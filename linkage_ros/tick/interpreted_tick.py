@@ -94,10 +94,10 @@ class InterpretedTick:
 
 
 def _name_values(
-    linkage: LinkagePipeline, crank: Any, reading: Any, reactions: Any, given: Any
+    linkage: LinkagePipeline, crank: Any, reading: Any, reactions: Any, loads: Any
 ) -> LinkageState:
     crank = crank if isinstance(crank, CrankState) else CrankState(*crank)
-    return LinkageState(linkage.solve_mechanism, crank, SensorReading(*reading), reactions, given)
+    return LinkageState(linkage.solve_mechanism, crank, SensorReading(*reading), reactions, loads)
 
 
 def _join_readings(

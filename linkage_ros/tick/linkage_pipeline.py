@@ -56,7 +56,7 @@ _Base = TypeVar('_Base', bound=Effect)
 
 
 class AuxiliaryOutput(NamedTuple):
-    """A message published beside the joint states."""
+    """A message published as well as the joint states."""
 
     effect: str  # The effect that asks for it
     # Name and type (package/msg/Type) of the topic.
@@ -103,11 +103,11 @@ class LinkagePipeline:
         scene_linkage = self.scene_linkage
         self.wanted = wanted = choose_effects(scene_linkage)
         mechanism = wanted.of_kind(MechanismEffect)
-        self._computed_fields = frozenset(each.gives for each in mechanism.values()) - {''}
+        self._computed_fields = frozenset(effect.gives for effect in mechanism.values()) - {''}
         self.published_fields = self._computed_fields - frozenset(
-            each.gives for name, each in mechanism.items() if name not in wanted.named
+            effect.gives for name, effect in mechanism.items() if name not in wanted.named
         )
-        """Fields of the reading that are published beside the joints."""
+        """Fields of the reading that are published in addition to the joints."""
         seed = f'{scene.seed}/{scene_linkage.name}'
         self.closure = closure or _make_closure(scene_linkage, wanted, seed)
         self.context = Context(
@@ -121,7 +121,7 @@ class LinkagePipeline:
             dependent=scene.dependent_joints,
             effects=frozenset(scene_linkage.effects),
             moves_by_rates=wanted.moves_by_rates,
-            takes_efforts=any(each.takes_efforts for each in wanted.effects.values()),
+            takes_efforts=any(effect.takes_efforts for effect in wanted.effects.values()),
             instead_of_inputs=scene_linkage.instead_of_inputs,
         )
         self._build_drive(wanted, injection)
@@ -201,7 +201,7 @@ class LinkagePipeline:
         )
 
     def _build_outputs(self, wanted: WantedEffects) -> None:
-        """Build the messages beside the joint states: of the effects, and of the drive."""
+        """Build the messages other than the joint states: of the effects, and of the drive."""
         scene_linkage = self.scene_linkage
         self.extras = [
             _make_output(
@@ -216,7 +216,7 @@ class LinkagePipeline:
             for name, effect in wanted.of_kind(MessageEffect).items()
             if name in wanted.named
         ]
-        """The topics beside the joint states."""
+        """The topics other than that of the joint states."""
         name, drive = scene_linkage.drive
         if (written := drive.writer(self.context, self.drive)) is not None:
             self.extras.append(
@@ -255,25 +255,25 @@ class LinkagePipeline:
             reading = self._apply_sensors_in_gap(now)
             return LinkageState(self.solve_mechanism, crank, reading, solution=(position, None))
         # The time of the loads begins here: a bag does not know of ticks before the first pose.
-        given = self.changing_loads.given_at(now) if self.changing_loads is not None else ()
+        loads = self.changing_loads.given_at(now) if self.changing_loads is not None else ()
         if self.context.takes_efforts:
-            given += self.drive.efforts
-        motion = self._mechanism_motion(crank, position, given)
+            loads += self.drive.efforts
+        motion = self._mechanism_motion(crank, position, loads)
         reading = self._apply_sensors(now, self.observe(now, motion))
-        return LinkageState(self.solve_mechanism, crank, reading, (), given, (position, motion))
+        return LinkageState(self.solve_mechanism, crank, reading, (), loads, (position, motion))
 
     def solve_mechanism(
-        self, crank: CrankState, given: tuple[float, ...]
+        self, crank: CrankState, loads: tuple[float, ...]
     ) -> tuple[Position, MechanismState]:
         """Return position and motion of the linkage for a crank state of a compiled tick."""
         position = self._solve_loops(*crank.angles)
-        return position, self._mechanism_motion(crank, position, given)
+        return position, self._mechanism_motion(crank, position, loads)
 
     def _mechanism_motion(
-        self, crank: CrankState, position: Position, given: tuple[float, ...]
+        self, crank: CrankState, position: Position, loads: tuple[float, ...]
     ) -> MechanismState:
         """Return the motion of the mechanism in a pose."""
-        motion = MechanismState(crank, position, None, None, (), (), (), given)
+        motion = MechanismState(crank, position, None, None, (), (), (), loads)
         for stage in self.mechanism_stages:
             motion = stage(motion)
         return motion
@@ -473,7 +473,7 @@ def _refuse_idle(scene_linkage: SceneLinkage, forced: bool) -> None:
     idle = ['loads'] if scene_linkage.loads and 'loads' in section else []
     if 'effects' in section:
         effects = scene_linkage.effects.items()
-        idle += [f'effects.{name}' for name, each in effects if isinstance(each, ForceEffect)]
+        idle += [f'effects.{name}' for name, effect in effects if isinstance(effect, ForceEffect)]
     if idle and not forced:
         raise DefinitionError(
             idle[0],

@@ -67,7 +67,7 @@ class Pipeline:
             for index, scene_linkage in enumerate(scene.linkages)
         ]
         self.extras = [extra for linkage in self.linkages for extra in linkage.extras]
-        """The topics beside the joint states."""
+        """The topics other than that of the joint states."""
         topics = sorted({linkage.topic for linkage in self.linkages} - {''})
         if len(topics) > 1:
             raise scene.linkages[0].content.error(
@@ -202,6 +202,6 @@ def _refuse_beside(scene: Scene) -> None:
     """Refuse effects that do not fit to those of the other linkages."""
     for scene_linkage in scene.linkages:
         for name, effect in scene_linkage.effects.items():
-            beside = [other.effects.get(name) for other in scene.linkages]
+            beside = [linkage.effects.get(name) for linkage in scene.linkages]
             if (error := effect.refusal_beside(beside)) is not None:
                 raise scene_linkage.content.locate_error(error)

@@ -83,8 +83,8 @@ def list_run_topics(pipeline: Pipeline, *, has_description: bool = False) -> lis
         (True, RunTopic(DIAGNOSTICS, '/diagnostics', _HEALTH, QosProfile(depth=1))),
         (pipeline.topic, RunTopic(CRANK, pipeline.topic, JOINT_STATE_TYPE, SENSOR_QOS)),
         *(
-            (True, RunTopic(WRENCH_TOPICS, each.topic, _WRENCH, SENSOR_QOS, 'loads.wrenches'))
-            for each in pipeline.wrenches
+            (True, RunTopic(WRENCH_TOPICS, wrench.topic, _WRENCH, SENSOR_QOS, 'loads.wrenches'))
+            for wrench in pipeline.wrenches
         ),
         (pipeline.injection, RunTopic(FAULTS, '~/faults', _STRING, FAULTS_QOS, 'faults')),
         # Withheld ticks and resets are recorded for the replay only; nothing publishes them.

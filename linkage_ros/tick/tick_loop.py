@@ -459,20 +459,20 @@ class TickLoop:
         counts.ticks += 1
         if True in self._meets_cells:
             self._make_cells_ahead(tick)
-        for index, one in enumerate(tick.computed):
-            if not isinstance(one, LinkageState):
+        for index, state in enumerate(tick.computed):
+            if not isinstance(state, LinkageState):
                 continue
-            if one.is_compiled:
-                counts.suppressed += one.reading is None
+            if state.is_compiled:
+                counts.suppressed += state.reading is None
                 continue
-            position = one.position
+            position = state.position
             if position is None:
                 counts.without_crank += 1
                 continue
             if position.status is not Status.CLOSED:
                 counts.unclosed[position.status] += 1
                 counts.last_unclosed[position.status] = index, position
-            if one.reading is None and position.joints:
+            if state.reading is None and position.joints:
                 counts.suppressed += 1
 
     def _make_cells_ahead(self, tick: Tick) -> None:

@@ -42,9 +42,9 @@ class WrenchTopic:
     def __init__(
         self, scene_linkage: SceneLinkage, link: str, drive: Any, held: HeldWrench
     ) -> None:
-        given = scene_linkage.loads.applied.wrenches[link] if scene_linkage.loads else None
+        wrench = scene_linkage.loads.applied.wrenches[link] if scene_linkage.loads else None
         self.key = f'loads.wrenches.{link}'  # In the scene
-        self.topic = (given and given.topic) or f'wrenches/{scene_linkage.prefix}{link}'
+        self.topic = (wrench and wrench.topic) or f'wrenches/{scene_linkage.prefix}{link}'
         self.wrench = held
         self._change_load = getattr(drive, 'load', None)
         self._content = scene_linkage.content
@@ -90,18 +90,18 @@ def make_wrench_topics(
         for link, held in wrenches.items()
     )
     taken = {drive_topic: 'the drive', 'joint_states': 'the joint states'}
-    for index, one in enumerate(topics):
-        name = one.topic
+    for index, wrench in enumerate(topics):
+        name = wrench.topic
         if index == MOST_WRENCHES:
-            raise one.refusal(
+            raise wrench.refusal(
                 f'is one of {len(topics)}, more than {MOST_WRENCHES}', 'leave some out'
             )
         if not fullmatch(_NAME, name) or len(name) > _LONGEST:
-            raise one.refusal(
+            raise wrench.refusal(
                 f'{quote(name)} is not a ROS topic', 'write a topic, as topic: wrenches/coupler'
             )
         name = name.removeprefix('/')
         if name in taken:
-            raise one.refusal(f'{quote(name)} is the topic of {taken[name]}', 'write another')
-        taken[name] = one.key
+            raise wrench.refusal(f'{quote(name)} is the topic of {taken[name]}', 'write another')
+        taken[name] = wrench.key
     return topics
