@@ -137,14 +137,14 @@ class TopicComparison:
         for key in then.keys:
             if key in numbers:
                 self.deviations.setdefault(key, Deviation()).compared += 1
-        for key, number, other in apart:
-            self.deviations[key].add_difference(number, other, at)
+        for key, number, second in apart:
+            self.deviations[key].add_difference(number, second, at)
         if then.names != again.names:
             self.only_recorded |= dict.fromkeys(n for n in then.names if n not in again.names)
             self.only_now |= dict.fromkeys(n for n in again.names if n not in then.names)
         if apart:
-            (joint, quantity), number, other = apart[0]
-            return FirstDifference(at, self.name, quantity, joint, number, other)
+            (joint, quantity), number, second = apart[0]
+            return FirstDifference(at, self.name, quantity, joint, number, second)
         return FirstDifference(at, self.name, _difference_text(then, again))
 
 

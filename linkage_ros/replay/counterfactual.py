@@ -15,8 +15,8 @@ apart; else the run lost them, and the other scene makes none either. At another
 one period apart from the first one on, and each moves to a tick of the bag that is within half a
 period, so that both can be compared. A scene with a rate of 0 ticks for every good sample.
 
-The recorded scene runs beside the other one, at the same ticks. So it is known how much of the
-difference comes from the ticks, or from what the bag lacks, and not from the other scene.
+The recorded scene runs together with the other one, at the same ticks. So it is known how much of
+the difference comes from the ticks, or from what the bag lacks, and not from the other scene.
 
 A fault that is the same in both scenes begins and ends as in the run; others follow the other
 scene. The events that are yielded are those that a recorder would have been given, so that a
@@ -88,12 +88,12 @@ def check_drives(scene: Scene, where: str) -> None:
     drives = [scene_linkage.drive[0] for scene_linkage in scene.linkages]
     for scene_linkage, drive in zip(scene.linkages, drives, strict=True):
         if drive not in _TOPICS or drive != drives[0]:
-            beside = f' beside {drives[0]}' if drive in _TOPICS else ''
+            with_drive = f' with {drives[0]}' if drive in _TOPICS else ''
             raise LinkageError(
                 where,
                 f'{f"{scene_linkage.name}: " if scene_linkage.name else ""}its drive is '
-                f'{drive}{beside}, which takes no samples from a bag',
-                f'write drive: {{{drives[0] if beside else "topic"}: {{}}}}',
+                f'{drive}{with_drive}, which takes no samples from a bag',
+                f'write drive: {{{drives[0] if with_drive else "topic"}: {{}}}}',
             )
         if scene_linkage.loads is not None and scene_linkage.loads.applied.wrenches:
             raise LinkageError(
@@ -451,12 +451,12 @@ def _candidate_topics(
                 did_you_mean(typed, held, f'it holds {list_names(held) or "none"}'),
             )
         return [typed]
-    other = recorded is not None and any(
+    is_replaced = recorded is not None and any(
         scene_linkage.drive[0] != drive for scene_linkage in recorded.linkages
     )
-    if run.crank_topic in held and not other:
+    if run.crank_topic in held and not is_replaced:
         return [run.crank_topic]
-    if _TOPICS[drive] in held and not other:
+    if _TOPICS[drive] in held and not is_replaced:
         return [_TOPICS[drive]]
     if drive == 'torque':
         return []

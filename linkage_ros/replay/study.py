@@ -107,10 +107,10 @@ def sweep_of(text: str) -> ParameterSweep:
                 raise _too_many(count)
             first = float(low)
             step = (high - first) / (count - 1)
-            found = (*(first + step * index for index in range(count - 1)), high)
+            steps = (*(first + step * index for index in range(count - 1)), high)
         else:
-            found = tuple(map(float, values.split(',')))
-        if not all(map(isfinite, found)):
+            steps = tuple(map(float, values.split(',')))
+        if not all(map(isfinite, steps)):
             raise ValueError
     except (ValueError, IndexError):
         raise LinkageError(
@@ -118,9 +118,9 @@ def sweep_of(text: str) -> ParameterSweep:
             'is neither KEY=LOW:HIGH:N nor KEY=a,b,c',
             'write numbers, as rate=100,1000 or loads.drive_inertia=1e-4:1e-3:10',
         ) from None
-    if len(set(found)) < len(found):
+    if len(set(steps)) < len(steps):
         raise LinkageError(f'--sweep {quote(text)}', 'names a value twice', 'name each once')
-    return ParameterSweep(key, found)
+    return ParameterSweep(key, steps)
 
 
 def _too_many(count: int) -> LinkageError:
@@ -209,9 +209,9 @@ def _reduce_run(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome
                 rows = slice(firsts[which], firsts[which] + len(reading.joints))
                 kept[rows, place] = reading.joints
     statistics = {
-        f'{joint}{quantity}': one
+        f'{joint}{quantity}': statistic
         for (which, quantity), reduction in reduced.items()
-        for joint, one in zip(joints[which], reduction.column_statistics(), strict=False)
+        for joint, statistic in zip(joints[which], reduction.column_statistics(), strict=False)
     }
     return Outcome('', len(at), messages, statistics, kept)
 
@@ -292,7 +292,7 @@ def _in_processes(
             running |= {pool.submit(work, part) for part in ahead}
             done, running = wait(running, return_when=FIRST_COMPLETED)
             # Finished runs first: where a process was killed, all others fail with it.
-            for future in sorted(done, key=lambda each: each.exception() is not None):
+            for future in sorted(done, key=lambda future: future.exception() is not None):
                 yield future.result()
             ended = not done
     except BrokenProcessPool:

@@ -67,7 +67,7 @@ def describe_topic(name: str, message_class: Any, qos: QosProfile) -> Topic:
     _collect_definitions(message_class, package, kind, texts)
     first, *others = texts
     definition = texts[first] + ''.join(
-        f'{_SEPARATOR}MSG: {other}\n{texts[other]}' for other in others
+        f'{_SEPARATOR}MSG: {name}\n{texts[name]}' for name in others
     )
     return Topic(name, f'{package}/msg/{kind}', definition, _type_hash(package, kind), qos)
 
@@ -81,9 +81,9 @@ def _collect_definitions(
     texts[f'{package}/{kind}'] = _installed_file(package, f'{kind}.msg').read_text('utf-8')
     nested = _NESTED.findall(' '.join(message_class.get_fields_and_field_types().values()))
     # Sorted by full name, as rosbag2 does.
-    for other, other_kind in sorted(nested):
-        other_class = message_type(f'{other}/msg/{other_kind}', f'{package}/msg/{kind}')
-        _collect_definitions(other_class, other, other_kind, texts)
+    for other_package, other_kind in sorted(nested):
+        other_class = message_type(f'{other_package}/msg/{other_kind}', f'{package}/msg/{kind}')
+        _collect_definitions(other_class, other_package, other_kind, texts)
 
 
 def _type_hash(package: str, kind: str) -> str:

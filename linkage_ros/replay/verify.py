@@ -122,7 +122,7 @@ def turning_joints(scene: Scene) -> dict[str, bool]:
     """Return for each joint of a scene, published or driven, whether it is a revolute joint."""
     revolute: dict[str, bool] = {}
     for scene_linkage in scene.linkages:
-        driven = [not given.slider for given in scene_linkage.linkage.inputs]
+        driven = [not driven_joint.slider for driven_joint in scene_linkage.linkage.inputs]
         revolute |= dict(zip(scene_linkage.input_names, driven, strict=True))
         kinds = [
             isinstance(joint, RevoluteJoint) for joint in scene_linkage.linkage.joints.values()
