@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The node: parameters, topics, pacing, recording, diagnostics; the nodes beside it."""
+"""The node: parameters, topics, pacing, recording, diagnostics; and the other nodes."""
 
 from linkage_ros.faces import lazy_names
 

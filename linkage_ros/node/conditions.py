@@ -140,7 +140,7 @@ class RunState:
     def inputs(self) -> list[str]:
         """Return the joints whose samples come from the crank's topic."""
         linkages = (linkage for linkage in self.loop.pipeline.linkages if linkage.topic)
-        return [name for each in linkages for name in each.scene_linkage.sampled_joints]
+        return [name for linkage in linkages for name in linkage.scene_linkage.sampled_joints]
 
     @property
     def takes_commands(self) -> bool:
@@ -244,13 +244,13 @@ def crank_conditions(run: RunState, since: Since) -> Iterator[Condition]:
         )
         yield Condition(OK, text, 'stale', _STALE_PERIOD)
     for line in run.loop.pipeline.linkages:
-        given, jump = line.closure.linkage.inputs[0], getattr(line.drive, 'jump', 0.0)
-        if jump > _MORE_THAN_A_TURN and not given.slider:
+        driven, jump = line.closure.linkage.inputs[0], getattr(line.drive, 'jump', 0.0)
+        if jump > _MORE_THAN_A_TURN and not driven.slider:
             text = (
-                f'{topic}: {given.joint} changed by {jump:.4g} rad between two samples, more '
+                f'{topic}: {driven.joint} changed by {jump:.4g} rad between two samples, more '
                 'than a turn; if these are degrees, publish radians'
             )
-            yield Condition(OK, text, f'jump {given.joint}', inf)
+            yield Condition(OK, text, f'jump {driven.joint}', inf)
 
 
 def _find_silent_inputs(run: RunState) -> Iterator[Condition]:
@@ -304,7 +304,7 @@ def wrench_conditions(run: RunState, since: Since) -> Iterator[Condition]:
         zip(run.wrench_topics, run.loop.pipeline.wrenches, strict=True)
     ):
         kind = f'wrenches {name}'
-        now, before = (each.wrenches[index].rejected for each in (run.counts, since[kind]))
+        now, before = (counts.wrenches[index].rejected for counts in (run.counts, since[kind]))
         yield from _find_rejections(kind, name, message, now, before)
         held = topic.wrench
         if not held.stamp or run.clock - held.stamp > held.max_age:

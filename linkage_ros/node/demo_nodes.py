@@ -135,7 +135,10 @@ class PDController(DemoNode):
         super().__init__('pd_controller')
         self._joints = {
             joint: ControlledJoint(
-                *(self.value_of_parameter(f'{joint}.{each.name}') for each in _OF_EACH_JOINT)
+                *(
+                    self.value_of_parameter(f'{joint}.{parameter.name}')
+                    for parameter in _OF_EACH_JOINT
+                )
             )
             for joint in self.value_of_parameter('joints')
         }

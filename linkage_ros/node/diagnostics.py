@@ -226,8 +226,8 @@ def _describe_faults(injection: Injection) -> tuple[str, list[Condition], Values
     for name, fault in injection.faults.items():
         values[f'{name} ({fault.kind})'] = 'injected' if name in on else 'off'
         values[f'Times injected: {name}'] = injection.injected[name]
-    found = [Condition(WARN, f'Injected: {", ".join(on)}')] if on else []
-    return 'None injected', found, values
+    conditions = [Condition(WARN, f'Injected: {", ".join(on)}')] if on else []
+    return 'None injected', conditions, values
 
 
 def _wrench_values(run: RunState) -> Values:
@@ -259,14 +259,14 @@ def _describe_recording(recording: RunRecording) -> tuple[str, list[Condition], 
         values[f'Waiting: {topic.name}'] = topic.waiting
         if topic.discarded:
             values[f'Discarded: {topic.name}'] = topic.discarded
-    found = []
+    conditions = []
     if recorder.failure is not None and recorder.is_recording:
-        found.append(Condition(WARN, f'Recording again, in a new file: {recorder.failure}'))
+        conditions.append(Condition(WARN, f'Recording again, in a new file: {recorder.failure}'))
     elif recorder.failure is not None:
-        found.append(Condition(ERROR, str(recorder.failure)))
+        conditions.append(Condition(ERROR, str(recorder.failure)))
     elif any(topic.dropped for topic in topics):
-        found.append(Condition(WARN, 'The disk does not keep up: messages dropped'))
-    return 'Recording', found, values
+        conditions.append(Condition(WARN, 'The disk does not keep up: messages dropped'))
+    return 'Recording', conditions, values
 
 
 def _describe_memory(snapshots: RunSnapshots) -> tuple[str, list[Condition], Values]:
@@ -287,17 +287,17 @@ def _describe_memory(snapshots: RunSnapshots) -> tuple[str, list[Condition], Val
         'Snapshots failed': snapshots.failed,
         'Last snapshot': snapshots.last_folder,
     }
-    found = []
+    conditions = []
     if memory.failure is not None:
-        found.append(Condition(ERROR, str(memory.failure)))
+        conditions.append(Condition(ERROR, str(memory.failure)))
     elif snapshots.failure:
-        found.append(Condition(ERROR, f'Last snapshot: {snapshots.failure}'))
+        conditions.append(Condition(ERROR, f'Last snapshot: {snapshots.failure}'))
     elif any(topic.dropped for topic in topics):
-        found.append(Condition(WARN, 'The memory does not keep up: messages dropped'))
+        conditions.append(Condition(WARN, 'The memory does not keep up: messages dropped'))
     elif crowded:
         text = f'Room for {seconds:.1f} s of {memory.seconds:g} s: raise snapshot_bytes'
-        found.append(Condition(WARN, text))
-    return f'In memory: the last {memory.seconds:g} s', found, values
+        conditions.append(Condition(WARN, text))
+    return f'In memory: the last {memory.seconds:g} s', conditions, values
 
 
 def _limit_utilisation(
@@ -312,8 +312,8 @@ def _limit_utilisation(
         rates = dict(zip(linkage.joints, reading.rates if reading else (), strict=False))
         efforts = dict(zip(linkage.joints, reading.efforts if reading else (), strict=False))
         driven = zip(linkage.inputs, crank.rates if crank else (), strict=False)
-        rates |= {given.joint: rate for given, rate in driven}
-        for name in [each for each in rates | efforts if each in linkage.limits]:
+        rates |= {driven_joint.joint: rate for driven_joint, rate in driven}
+        for name in [joint for joint in rates | efforts if joint in linkage.limits]:
             limits = linkage.limits[name]
             for what, exerted, most in (
                 ('Velocity', rates, limits.velocity),

@@ -163,7 +163,7 @@ class LinkageNode(LifecycleNode):
         self._twin_since = self._several_since = inf
         self._real_time = RealTime(
             self.get_parameter('thread_priority').value,
-            [each for each in self.get_parameter('cpu_affinity').value if each != -1],
+            [core for core in self.get_parameter('cpu_affinity').value if core != -1],
             self.get_parameter('lock_memory').value,
         )
         why = standstill_reason()
@@ -205,8 +205,8 @@ class LinkageNode(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def _set_scene(self) -> tuple[str, list[str]]:
-        """Return the scene's file and the settings beside it, as the parameters have them."""
-        settings = [each for each in self.get_parameter('set').value if each]
+        """Return the scene's file and the settings of its keys, as the parameters have them."""
+        settings = [setting for setting in self.get_parameter('set').value if setting]
         if self.get_parameter('model_joints').value:
             settings.append('model_joints=true')
         return self.get_parameter('scene').value, settings
@@ -253,9 +253,11 @@ class LinkageNode(LifecycleNode):
             dict.fromkeys(scene_linkage.drive[0] for scene_linkage in self.scene.linkages)
         )
         source = f'from {self.crank_topic}' if self.crank_topic else f'driven by {drives}'
-        wrenches = [each.topic_name for each in self._scene_topics.wrenches]
+        wrenches = [wrench.topic_name for wrench in self._scene_topics.wrenches]
         source += f'; wrenches from {" and ".join(wrenches)}' if wrenches else ''
-        to = [each.topic_name for each in (self._joint_states, *self._scene_topics.extras)]
+        to = [
+            publisher.topic_name for publisher in (self._joint_states, *self._scene_topics.extras)
+        ]
         self.get_logger().info(
             f'{self.scene.name}: ticking {rate}; crank {cranks} {source}; '
             f'{", ".join(self.scene.joint_names)} to {" and ".join(to)}'
@@ -455,7 +457,7 @@ class LinkageNode(LifecycleNode):
             is_simulated=self.get_parameter('use_sim_time').value,
             start=self._activation_time,
             crank_topic=self.crank_topic,
-            wrench_topics=[each.topic_name for each in self._scene_topics.wrenches],
+            wrench_topics=[wrench.topic_name for wrench in self._scene_topics.wrenches],
             clock_silence=self._clock_silence(),
             clock_refused=self._clock_guard.refused_count,
             system=self._real_time.in_force | self._middleware,
@@ -501,7 +503,7 @@ class LinkageNode(LifecycleNode):
         """Return that there is another node of this name, or of these joints; '' if not."""
         name = self.get_fully_qualified_name()
         nodes = self.get_node_names_and_namespaces()
-        has_twin = [f'{space.rstrip("/")}/{each}' for each, space in nodes].count(name) > 1
+        has_twin = [f'{space.rstrip("/")}/{node}' for node, space in nodes].count(name) > 1
         self._twin_since = min(self._twin_since, now.time) if has_twin else inf
         if now.time - self._twin_since > _TWIN_PATIENCE * NANOSECONDS:
             return (

@@ -120,11 +120,11 @@ def declare_parameters(node: Node, parameters: Iterable[NodeParameter]) -> None:
 
     Each is declared before the next is asked for, which may depend on its value.
     """
-    given = node._parameter_overrides  # noqa: SLF001 (rclpy has no other way)
+    overrides = node._parameter_overrides  # noqa: SLF001 (rclpy has no other way)
     names = []
     for name, default, meaning, bounds, changeable in parameters:
-        if name in given and given[name].type_ is Parameter.Type.NOT_SET:
-            del given[name]  # an empty list in a file
+        if name in overrides and overrides[name].type_ is Parameter.Type.NOT_SET:
+            del overrides[name]  # an empty list in a file
         descriptor = ParameterDescriptor(description=meaning, read_only=not changeable)
         descriptor.additional_constraints = changeable
         if bounds is not None:
@@ -137,7 +137,7 @@ def declare_parameters(node: Node, parameters: Iterable[NodeParameter]) -> None:
                 descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
         node.declare_parameter(name, default, descriptor)
         names.append(name)
-    for name in given:
+    for name in overrides:
         # Qualities of service are declared with their publisher.
         if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
             remedy = did_you_mean(name, names, f'known: {list_names(names)}')

@@ -44,7 +44,9 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 PARAMETERS = tuple(
-    one for one in LINKAGE_NODE if one.name in ('scene', 'set', 'diagnostics_period')
+    parameter
+    for parameter in LINKAGE_NODE
+    if parameter.name in ('scene', 'set', 'diagnostics_period')
 )
 _LOOK = 0.1
 _QUIET = 5.0
@@ -66,12 +68,14 @@ class CommandRelay:
     def __init__(self, scene: Scene) -> None:
         self._lines = [
             _Line(
-                ExchangedInputs(one.closure, one.instead_of_inputs, one.drive[1].branch),
-                one.sampled_joints,
-                one.input_names,
+                ExchangedInputs(
+                    linkage.closure, linkage.instead_of_inputs, linkage.drive[1].branch
+                ),
+                linkage.sampled_joints,
+                linkage.input_names,
             )
-            for one in scene.linkages
-            if one.instead_of_inputs
+            for linkage in scene.linkages
+            if linkage.instead_of_inputs
         ]
         if not self._lines:
             raise DefinitionError(
@@ -115,15 +119,15 @@ class CommandRelay:
         for number, point in enumerate(message.points, 1):
             try:
                 rows = point.positions, point.velocities, point.accelerations, point.effort
-                found = _input_arrays(lines, names, *rows)
+                arrays = _input_arrays(lines, names, *rows)
             except RefusedError as error:
                 raise RefusedError(f'point {number} of {len(message.points)}: {error}') from None
             points.append(
                 JointTrajectoryPoint(
-                    positions=found[0],
-                    velocities=found[1],
-                    accelerations=found[2],
-                    effort=found[3],
+                    positions=arrays[0],
+                    velocities=arrays[1],
+                    accelerations=arrays[2],
+                    effort=arrays[3],
                     time_from_start=point.time_from_start,
                 )
             )
@@ -150,14 +154,14 @@ def _input_arrays(
         raise RefusedError(f'{len(positions)} positions for {len(names)} joints')
     if not {len(row) for row in others} <= {0, len(names)}:
         raise RefusedError('arrays of unequal length')
-    given = [dict(zip(names, row, strict=False)) for row in rows]
+    named_rows = [dict(zip(names, row, strict=False)) for row in rows]
     motions = [
-        line.motion_at(*([of[name] for name in line.joints if of] for of in given))
+        line.motion_at(*([of[name] for name in line.joints if of] for of in named_rows))
         for line in lines
     ]
     return [
         [value for motion in motions for value in motion[order]] if of else []
-        for order, of in enumerate(given)
+        for order, of in enumerate(named_rows)
     ]
 
 
@@ -180,21 +184,21 @@ class _Line(NamedTuple):
         position = exchange.find_position(values)
         if position is None or position.status is Status.LIMITED:
             places = ', '.join(
-                f'{name} at {value:.6g} {given.unit}'
-                for name, value, given in zip(
+                f'{name} at {value:.6g} {driven.unit}'
+                for name, value, driven in zip(
                     self.joints, values, exchange.inverse.linkage.inputs, strict=True
                 )
             )
             raise RefusedError(f'{places} is not reached: {self._reason(position)}')
         motion = exchange.motion_at(position, rates, accelerations)
         if efforts and all(map(isfinite, efforts)):
-            if not (found := exchange.efforts_at(motion.inputs, efforts)):
+            if not (efforts_found := exchange.efforts_at(motion.inputs, efforts)):
                 raise RefusedError(
                     f'an effort of {list_names(self.joints)} comes to none of the inputs there'
                 )
-            motion = motion._replace(efforts=found)
+            motion = motion._replace(efforts=efforts_found)
         if position.status is Status.TOGGLE:
-            if any(isfinite(one) and one for one in (*rates, *accelerations)):
+            if any(isfinite(value) and value for value in (*rates, *accelerations)):
                 joints = list_names(self.joints)
                 raise RefusedError(f'{joints} turns back there: the crank has no rate')
             return motion._replace(rates=tuple(rates), accelerations=tuple(accelerations))
@@ -212,10 +216,10 @@ class RelayNode(Node):
     """The node; ``scene`` and ``settings`` stand for its parameters."""
 
     def __init__(self, scene: str = '', settings: Sequence[str] = ()) -> None:
-        given = [Parameter('scene', value=scene)] if scene else []
+        overrides = [Parameter('scene', value=scene)] if scene else []
         if settings:
-            given.append(Parameter('set', value=list(settings)))
-        super().__init__('linkage_relay', parameter_overrides=given)
+            overrides.append(Parameter('set', value=list(settings)))
+        super().__init__('linkage_relay', parameter_overrides=overrides)
         declare_parameters(self, PARAMETERS)
         file = self.get_parameter('scene').value
         if not file:
@@ -240,17 +244,17 @@ class RelayNode(Node):
 
     def _send_turned(self, publisher: Any, turn: Any, message: Any) -> None:
         try:
-            found = turn(message)
+            turned = turn(message)
         except RefusedError as error:
             self._counts['refused'] += 1
             self._last_refusal = str(error)
             text = f'{publisher.topic_name}: not sent: {error}'
             self.get_logger().warning(text, throttle_duration_sec=_QUIET)
             return
-        if found is None:
+        if turned is None:
             self._counts['of other joints'] += 1
             return
-        publisher.publish(found)
+        publisher.publish(turned)
         self._counts['sent'] += 1
 
     def _publish_counts(self) -> None:

@@ -81,8 +81,8 @@ def run_linkage_node(
         rclpy.init(
             args=['linkage_node', *arguments], signal_handler_options=SignalHandlerOptions.NO
         )
-        given = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
-        node = LinkageNode(parameter_overrides=given, logs_failure=not raise_errors)
+        parameters = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
+        node = LinkageNode(parameter_overrides=parameters, logs_failure=not raise_errors)
     except Exception as error:  # noqa: BLE001 (rcl's errors have no common base class)
         print(f'linkage_node: {_first_line(error)}; see linkage_node --help', file=sys.stderr)
         rclpy.try_shutdown()

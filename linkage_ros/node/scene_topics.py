@@ -133,7 +133,7 @@ class SceneTopics:
         node = self._node
         others: list[Any] = [*node.publishers, *node.subscriptions]
         names = [topic.name for topic in self._topics if topic.key != WRENCH_TOPICS]
-        taken = {each.topic_name for each in others}
+        taken = {topic.topic_name for topic in others}
         taken |= set(map(node.resolve_topic_name, (*names, SCENE_TOPIC, 'robot_description')))
         for wrench in pipeline.wrenches:
             name = node.resolve_topic_name(wrench.topic)
@@ -215,7 +215,10 @@ class SceneTopics:
     @property
     def take_wrenches(self) -> list[TakeMessage]:
         """Return functions that take the next message of each topic with a wrench."""
-        return [partial(one.handle.take_message, one.msg_type, True) for one in self.wrenches]
+        return [
+            partial(subscription.handle.take_message, subscription.msg_type, True)
+            for subscription in self.wrenches
+        ]
 
     def publish_change(self, change: FaultChange) -> bytes:
         """Publish the begin or end of a fault; return the serialized message."""
