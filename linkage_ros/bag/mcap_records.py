@@ -417,16 +417,16 @@ class DataSection:
         if opcode in _ELSEWHERE:
             raise DamagedError('has a record type that is not allowed here')
         content = self.source.read(at + HEAD.size, end - at - HEAD.size)
-        found: tuple[FoundRecord, ...] = ()
+        records: tuple[FoundRecord, ...] = ()
         if opcode == Opcode.MESSAGE:
-            found = (message_of(content, 0, len(content), self.definitions),)
+            records = (message_of(content, 0, len(content), self.definitions),)
             self.unchecked += not self.has_checksum()
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self.definitions.add_record(opcode, content)
         elif opcode == Opcode.HEADER:
             self.profile = parse_strictly(Header, content).profile
         elif opcode == Opcode.METADATA:
-            found = (parse_strictly(Metadata, content),)
+            records = (parse_strictly(Metadata, content),)
         elif opcode == Opcode.MESSAGE_INDEX:
             if (
                 len(content) < _INDEX.size
@@ -442,7 +442,7 @@ class DataSection:
             raise DamagedError('is a chunk or an attachment with another record type')
         else:
             self.unknown.append((at, end))
-        return found, end
+        return records, end
 
     def read_chunk(self, chunk: Chunk, *, fits: bool = True) -> Iterable[Message]:
         """Return a chunk's messages; `fits`: it begins and ends where its record does."""

@@ -136,8 +136,8 @@ def mcap_names(folder: Path) -> list[str]:
 
 
 def _file_names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
-    found = [file for file in folder.iterdir() if file.name.endswith(suffixes)]
-    return [file.name for file in sorted(found, key=by_number)]
+    files = [file for file in folder.iterdir() if file.name.endswith(suffixes)]
+    return [file.name for file in sorted(files, key=by_number)]
 
 
 def by_number(file: Path) -> tuple[int, str]:
@@ -182,9 +182,9 @@ def is_finished(file: Path) -> bool:
     if not start.startswith(MCAP0_MAGIC):
         kind = kind_of_bytes(start)
         binary = kind.noun == BINARY.noun
-        found = f'starts with {quote(start[:length])}' if binary else f'is {kind.noun}'
+        content = f'starts with {quote(start[:length])}' if binary else f'is {kind.noun}'
         raise BagError(
-            file, f'{found}, not an MCAP file', "name a bag's folder, or its .mcap file"
+            file, f'{content}, not an MCAP file', "name a bag's folder, or its .mcap file"
         )
     return size > length and end == MCAP0_MAGIC
 
@@ -236,11 +236,11 @@ def footer_metadata(file: Path) -> FooterMetadata:
         with file.open('rb') as stream:
             source = RecordSource(stream)
             records = index_of(source).metadata
-            accounted = any(each.name == STATS_RECORD for each in records)
+            accounted = any(record.name == STATS_RECORD for record in records)
             # Of several records, the last one has the final outcome.
-            latest = [each for each in records if each.name == 'rosbag2'][-1:]
-            for each in latest:
-                content = source.read(each.offset, each.length)
+            latest = [record for record in records if record.name == 'rosbag2'][-1:]
+            for latest_record in latest:
+                content = source.read(latest_record.offset, latest_record.length)
                 # Other records may take seconds to parse, and are not needed.
                 if b'linkage_ros.' in content:
                     head = HEAD.size
@@ -397,7 +397,7 @@ def _read_description(
             index = index_of(source)
             if index.definitions.channels:
                 return index.definitions, *_fitting_attachments(
-                    attachment_at(source, each.offset)[0] for each in index.attachments
+                    attachment_at(source, entry.offset)[0] for entry in index.attachments
                 )
     definitions = Definitions()
     contents = _read_contents(file, definitions, progress, until_damage=not finished)

@@ -104,8 +104,8 @@ def expected_counts(information: Mapping[str, Any]) -> dict[str, int]:
     """Return the message count of each topic in ``metadata.yaml``, if it has them."""
     counts = {}
     try:
-        for each in information['topics_with_message_count']:
-            counts[str(each['topic_metadata']['name'])] = int(each['message_count'])
+        for topic in information['topics_with_message_count']:
+            counts[str(topic['topic_metadata']['name'])] = int(topic['message_count'])
     except Exception:  # noqa: BLE001 (its content may be anything)
         return {}
     return counts if any(counts.values()) else {}
@@ -149,33 +149,37 @@ class RecoveredBag:
         """Forget the channel numbers, which are valid for one file."""
         self._numbers.clear()
 
-    def add_item(self, found: FoundRecord, definitions: Definitions) -> None:
+    def add_item(self, record: FoundRecord, definitions: Definitions) -> None:
         """Add an item found in a file, with the file's schemas and channels so far."""
-        if isinstance(found, Message):
+        if isinstance(record, Message):
             if not self._numbers:
                 self.add_channels(definitions)
-            number = self._numbers.get(found.channel.id)
+            number = self._numbers.get(record.channel.id)
             if number is None:
                 # Not all channels known so far: each of thousands comes with its first message.
-                number = self._number_of(found.channel, definitions)
-                self._numbers[found.channel.id] = number
+                number = self._number_of(record.channel, definitions)
+                self._numbers[record.channel.id] = number
             self._mcap.add_message(
-                number, found.log_time, found.data, found.publish_time, found.sequence
+                number, record.log_time, record.data, record.publish_time, record.sequence
             )
-            self.counts[found.channel.topic] += 1
-            self._start = min(self._start, found.log_time)
-            self._end = max(self._end, found.log_time)
-        elif isinstance(found, Attachment):
+            self.counts[record.channel.topic] += 1
+            self._start = min(self._start, record.log_time)
+            self._end = max(self._end, record.log_time)
+        elif isinstance(record, Attachment):
             # The files of one bag repeat them.
-            if self.attachments.get(found.name) != found.data:
-                self.attachments.setdefault(found.name, found.data)
+            if self.attachments.get(record.name) != record.data:
+                self.attachments.setdefault(record.name, record.data)
                 self._mcap.add_attachment(
-                    found.create_time, found.log_time, found.name, found.media_type, found.data
+                    record.create_time,
+                    record.log_time,
+                    record.name,
+                    record.media_type,
+                    record.data,
                 )
-        elif found.name != 'rosbag2':
-            self._mcap.add_metadata(found.name, found.metadata)
+        elif record.name != 'rosbag2':
+            self._mcap.add_metadata(record.name, record.metadata)
         else:
-            self.information = serialized_metadata(found)
+            self.information = serialized_metadata(record)
 
     def add_channels(self, definitions: Definitions) -> None:
         """Add all channels, also those without a message."""
@@ -249,7 +253,7 @@ class _Findings:
 
 
 def recovered_name(path: Path) -> Path:
-    """Return the default folder for the recovered bag, beside the bag."""
+    """Return the default folder for the recovered bag, next to the bag."""
     whole = Path(os.path.abspath(path))  # noqa: PTH100 (keeps the name of a link)
     return whole.with_name(f'{whole.name if path.is_dir() else whole.stem}_recovered')
 

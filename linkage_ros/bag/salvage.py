@@ -237,11 +237,11 @@ class Salvage:
 
     def _wanted_records(self, items: Iterable[FoundRecord]) -> Iterator[FoundRecord]:
         """Pass on the records for the caller; keep those for internal use."""
-        for one in items:
-            if isinstance(one, Attachment) and one.name == CHANNELS_FILE:
-                self._spare_definitions = definitions_in(one.data)
+        for item in items:
+            if isinstance(item, Attachment) and item.name == CHANNELS_FILE:
+                self._spare_definitions = definitions_in(item.data)
             else:
-                yield one
+                yield item
 
     def _resume_position(self, at: int) -> int:
         """Return the position to continue at after a damaged record."""
@@ -342,6 +342,6 @@ def _promised_records(
     promised: dict[int, ChunkIndex | AttachmentIndex | MetadataIndex] = {}
     if index:
         promised |= {chunk.chunk_start_offset: chunk for chunk in index.chunks}
-        promised |= {each.offset: each for each in index.attachments}
-        promised |= {each.offset: each for each in index.metadata}
+        promised |= {entry.offset: entry for entry in index.attachments}
+        promised |= {entry.offset: entry for entry in index.metadata}
     return promised
