@@ -54,7 +54,7 @@ _WORKS_ON = {
     'MechanismEffect': 'the mechanism, once its loops are closed',
     'SensorEffect': 'the reading of the sensors',
     'MessageEffect': 'nothing: it draws the mechanism',
-    'ForceEffect': 'all effects and drives that compute forces; it is no stage of the tick',
+    'ForceEffect': 'all effects and drives that compute forces; it is not a stage of the tick',
     'clock': 'the time of a tick',
     'message': 'the messages of the crank',
     'mechanism': 'the loop, once it is closed',

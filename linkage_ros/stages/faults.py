@@ -315,7 +315,7 @@ class Injection:
         built = [
             getattr(fault.parameters, function)(switch, *arguments) for fault, switch in pairs
         ]
-        return [each for each in built if each is not None]
+        return [function for function in built if function is not None]
 
 
 def _fault_windows(fault: FaultEntry) -> list[tuple[int, int]]:

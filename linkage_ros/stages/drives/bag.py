@@ -129,7 +129,7 @@ def read_samples(bag: Bag, topic: str, use: TopicDrive, context: Context) -> Bag
     If the topic is '', it is the crank topic of the run or, without a run's account in the bag,
     the only topic with good samples.
     """
-    of_type = [each.name for each in bag.topics if each.type == _TYPE]
+    of_type = [topic.name for topic in bag.topics if topic.type == _TYPE]
     if topic and topic not in of_type:
         known = list_names(of_type) or 'no other'
         raise BagError(bag.path, f'holds no topic {topic!r} of {_TYPE}', f'it holds {known}')

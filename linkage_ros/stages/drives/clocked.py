@@ -44,15 +44,15 @@ def refuse_beyond(
     its first value, and ``extent`` its least and greatest value, in [rad] or [m]; infinite without
     bound. Raise `DefinitionError`, which names the joint.
     """
-    given = closure.linkage.inputs[number]
+    driven = closure.linkage.inputs[number]
     low, high = extent
-    unit = given.unit
-    goes = f'takes {quote(given.joint)} from {low:.6g} {unit} to {high:.6g} {unit}'
+    unit = driven.unit
+    goes = f'takes {quote(driven.joint)} from {low:.6g} {unit} to {high:.6g} {unit}'
     for bound in closure.bounds.inputs:
         if bound.number == number and (bound.is_beyond(low) or bound.is_beyond(high)):
             raise DefinitionError(
                 where,
-                f'{goes}, beyond its limits {given.limits} {unit}',
+                f'{goes}, beyond its limits {driven.limits} {unit}',
                 'stay within them, or widen them in the linkage file',
             )
     if not closure.bounds.joints or len(closure.linkage.inputs) > 1:
@@ -107,10 +107,12 @@ class ClockedCrank(FormulaCrank):
         """Return the crank state at a time, in [ns], by the time of the first tick."""
         elapsed = now - held
         if len(self._curves) == 1:  # a loop over one would double the time
-            found = call(self._curves[0], elapsed)
-            return CrankState((found[0],), (found[1],), (found[2],), 0)
+            value, rate, acceleration = call(self._curves[0], elapsed)
+            return CrankState((value,), (rate,), (acceleration,), 0)
         several = [call(curve, elapsed) for curve in self._curves]
-        values, rates, accelerations = (tuple([one[i] for one in several]) for i in range(3))
+        values, rates, accelerations = (
+            tuple([derivatives[i] for derivatives in several]) for i in range(3)
+        )
         return CrankState(values, rates, accelerations, 0)
 
 
@@ -145,13 +147,13 @@ class ClockedDrive(InputMotion, Drive):
         Raise `DefinitionError` if every input has its own parameters, so that the common ones have
         no effect, or if an input leaves the limits of a joint.
         """
-        names = [given.joint for given in context.closure.linkage.inputs]
+        names = [driven.joint for driven in context.closure.linkage.inputs]
         where = self.KEY
         if self.inputs and len(self.inputs) == len(names):
             raise DefinitionError(
                 f'{where}.inputs',
-                f'names every input ({list_names(names)}), so the values beside it are unused',
-                f'leave one of them out: it then takes the values beside {where}.inputs',
+                f'names every input ({list_names(names)}), so the values outside it are unused',
+                f'leave one of them out: it then takes the values outside {where}.inputs',
             )
         curves = []
         for index, name in enumerate(names):

@@ -55,10 +55,10 @@ def compile_drive(drive: Crank, inputs: int, leave: str, leave_without_crank: st
         if id(part) not in kept
     }
     outputs = tuple(tuple(map(number_of, group)) for group in made.values())
-    given = (time.operation, *(symbol.operation for part in parts for symbol in part))
-    path = Path(given, tuple(tape.decisions), outputs, tape)
+    symbols = (time.operation, *(symbol.operation for part in parts for symbol in part))
+    path = Path(symbols, tuple(tape.decisions), outputs, tape)
     body = python_body(path, leave, 'd')
-    used = count_uses([*(one.condition for one in path.decisions), *chain(*outputs)])
+    used = count_uses([*(decision.condition for decision in path.decisions), *chain(*outputs)])
     lines = [f'held = drive.{drive.HELD}', 'if held is None:', f'    {leave}']
     lines.append(f'{", ".join(names)} = held')
     for part, name in zip(parts, names, strict=True):

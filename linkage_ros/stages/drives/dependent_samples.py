@@ -77,38 +77,38 @@ class ExchangedInputs:
 
     def _is_own(self, position: Position) -> bool:
         """Return whether the linkage itself has these joints at the inputs that are found."""
-        found = self._measured.close_unlimited(*self._inputs_of(position))
+        closed = self._measured.close_unlimited(*self._inputs_of(position))
         for row, value, turns in zip(self._rows, position.inputs, self._turns, strict=True):
-            if not found.joints:
+            if not closed.joints:
                 return False
-            off = found.joints[row] - value
+            off = closed.joints[row] - value
             off = remainder(off, tau) if turns else off / self._measured.scale
             if not abs(off) < _SAME:
                 return False
         return True
 
     def _inputs_of(self, position: Position) -> Values:
-        given = dict(zip(self.inverse.input_names, position.inputs, strict=True))
-        return tuple(given[name] if name in given else position[name] for name in self._names)
+        values = dict(zip(self.inverse.input_names, position.inputs, strict=True))
+        return tuple(values[name] if name in values else position[name] for name in self._names)
 
     def motion_at(
         self, position: Position, rates: Sequence[float], accelerations: Sequence[float] = ()
     ) -> ExchangedMotion:
         """Return the inputs at a position with rates and accelerations of the joints."""
         none = (nan,) * len(self._names)
-        found = ExchangedMotion(self._inputs_of(position), none, none, none)
+        motion = ExchangedMotion(self._inputs_of(position), none, none, none)
         if not (position.status.has_rates and rates and all(map(isfinite, rates))):
-            return found
+            return motion
         velocity = self.inverse.velocity(position, *rates)
         known = dict(zip(self.inverse.input_names, rates, strict=True))
         known |= dict(zip(self.inverse.joint_names, velocity.joints, strict=True))
-        found = found._replace(rates=tuple(known[name] for name in self._names))
+        motion = motion._replace(rates=tuple(known[name] for name in self._names))
         if not (accelerations and all(map(isfinite, accelerations))):
-            return found
+            return motion
         acceleration = self.inverse.acceleration(position, velocity, *accelerations)
         known = dict(zip(self.inverse.input_names, accelerations, strict=True))
         known |= dict(zip(self.inverse.joint_names, acceleration.joints, strict=True))
-        return found._replace(accelerations=tuple(known[name] for name in self._names))
+        return motion._replace(accelerations=tuple(known[name] for name in self._names))
 
     def efforts_at(self, inputs: Sequence[float], efforts: Sequence[float]) -> Values:
         """Return the efforts of the inputs for those of the joints; empty if undetermined."""

@@ -222,7 +222,7 @@ class Context:
     @property
     def inputs_in_messages(self) -> tuple[str, ...]:
         """Names of the driven joints, as messages have them."""
-        return tuple(self.prefix + given.joint for given in self.closure.linkage.inputs)
+        return tuple(self.prefix + driven.joint for driven in self.closure.linkage.inputs)
 
     def random(self, effect: str) -> Random:
         """Return the random generator of an effect, independent of other effects."""

@@ -171,7 +171,9 @@ def _cubic_spline(
         seam = (3.0 * (h0 * chords[-1] + h1 * chords[0]) - h0 * slopes[-2] - h1 * slopes[1]) / (
             2.0 * (h0 + h1) + h0 * unit[-2] + h1 * unit[1]
         )
-        slopes = [slope + seam * one for slope, one in zip(slopes, unit, strict=True)]
+        slopes = [
+            slope + seam * correction for slope, correction in zip(slopes, unit, strict=True)
+        ]
     return [
         (h * m0, 3.0 * step - h * (2.0 * m0 + m1), h * (m0 + m1) - 2.0 * step, 0.0, 0.0)
         for h, step, (m0, m1) in zip(seconds, steps, pairwise(slopes), strict=True)

@@ -154,7 +154,7 @@ def sample_inputs(
     use: TopicDrive, needs_rate: bool, inputs: Sequence[Input]
 ) -> SampledCrank | SampledInputs:
     """Return a crank that samples of some inputs move."""
-    cranks = [SampledCrank(use, needs_rate, slides=bool(given.slider)) for given in inputs]
+    cranks = [SampledCrank(use, needs_rate, slides=bool(driven.slider)) for driven in inputs]
     return cranks[0] if len(cranks) == 1 else SampledInputs(cranks)
 
 

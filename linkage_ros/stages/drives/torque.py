@@ -249,17 +249,17 @@ def _refuse_useless(parameters: TorqueDrive) -> None:
 def _build_single(parameters: TorqueDrive, context: Context) -> TorqueCrank:
     """Build the crank of a linkage with one input."""
     motion = _build_motion(parameters, context)
-    given = context.closure.linkage.inputs[0]
+    driven = context.closure.linkage.inputs[0]
     motor = None
     if parameters.motor is not None:
-        key = parameters.key_for(given.joint, 'motor')
-        motor = _build_motor(parameters.motor, given.limits.effort, key)
+        key = parameters.key_for(driven.joint, 'motor')
+        motor = _build_motor(parameters.motor, driven.limits.effort, key)
         motion = motor.mount_on(motion)
     start = motion.state_at(parameters.start, parameters.rate)
     if start is None:
         raise DefinitionError(
-            parameters.key_for(given.joint, 'start'),
-            f'at {parameters.start:g} {given.unit} nothing can be moved: a toggle, or no inertia',
+            parameters.key_for(driven.joint, 'start'),
+            f'at {parameters.start:g} {driven.unit} nothing can be moved: a toggle, or no inertia',
             'start elsewhere',
         )
     low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
@@ -314,32 +314,32 @@ def _check_step(
         )
 
 
-def _build_motor(given: MotorParameters, most: float, key: str) -> Motor | Winding:
+def _build_motor(parameters: MotorParameters, most: float, key: str) -> Motor | Winding:
     """Return the motor of an input that bears an effort of at most ``most``."""
     from linkage_ros.dynamics import Motor  # local import: only with a motor
 
-    voltage = given.command == 'voltage' or given.voltage < LARGEST
-    if voltage and given.resistance < _LEAST_RESISTANCE:
+    voltage = parameters.command == 'voltage' or parameters.voltage < LARGEST
+    if voltage and parameters.resistance < _LEAST_RESISTANCE:
         raise DefinitionError(
             f'{key}.resistance',
-            f'it is {given.resistance:g} Ω, and a voltage would give any current',
+            f'it is {parameters.resistance:g} Ω, and a voltage would give any current',
             "write the winding's, or command an effort or a current without a limit of voltage",
         )
     motor = Motor(
-        given.torque_constant,
-        given.resistance,
-        given.ratio,
-        given.efficiency,
-        given.back_efficiency,
+        parameters.torque_constant,
+        parameters.resistance,
+        parameters.ratio,
+        parameters.efficiency,
+        parameters.back_efficiency,
         min(
-            given.current,
-            given.torque / given.torque_constant,
-            most / (given.torque_constant * given.ratio * given.efficiency),
+            parameters.current,
+            parameters.torque / parameters.torque_constant,
+            most / (parameters.torque_constant * parameters.ratio * parameters.efficiency),
         ),
-        given.voltage,
-        given.command,
+        parameters.voltage,
+        parameters.command,
     )
-    if not given.inductance:
+    if not parameters.inductance:
         return motor
     if not voltage:
         raise DefinitionError(
@@ -350,23 +350,28 @@ def _build_motor(given: MotorParameters, most: float, key: str) -> Motor | Windi
     from linkage_ros.dynamics import Winding  # local import: only with an inductance
 
     by_current = replace(motor, supply=LARGEST, command='current')
-    return Winding(by_current, given.inductance, given.voltage, given.command)
+    return Winding(by_current, parameters.inductance, parameters.voltage, parameters.command)
 
 
 def _find_stops(closure: Closure, start: float, margin: float) -> tuple[float, float]:
     """Return the stops of the input, in [rad] or [m]: at limits, or before a toggle."""
     # If the input has limits, its angle is not reduced by whole turns.
     counted = closure.linkage.inputs[0].limits.is_bounded
-    for each in closure.input_ranges:
-        if each.is_whole:
+    for interval in closure.input_ranges:
+        if interval.is_whole:
             return -inf, inf
-        turns = 0.0 if counted else each.shift(start)
-        low, high = each.lowest - turns, each.highest - turns
+        turns = 0.0 if counted else interval.shift(start)
+        low, high = interval.lowest - turns, interval.highest - turns
         within = margin * (high - low)
         low, high = (
             (end if by else end + inwards) if limited else copy
             for end, inwards, copy, limited, by in zip(
-                (low, high), (within, -within), (-inf, inf), each.limited, each.by, strict=True
+                (low, high),
+                (within, -within),
+                (-inf, inf),
+                interval.limited,
+                interval.by,
+                strict=True,
             )
         )
         if low <= start <= high:
@@ -391,11 +396,11 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
     )
 
     mechanics, inputs = context.mechanics, context.closure.linkage.inputs
-    uses = tuple(parameters.for_input(given.joint) for given in inputs)
-    keys = [parameters.key_for(given.joint, 'motor') for given in inputs]
+    uses = tuple(parameters.for_input(driven.joint) for driven in inputs)
+    keys = [parameters.key_for(driven.joint, 'motor') for driven in inputs]
     built = [
-        _build_motor(use.motor, given.limits.effort, key) if use.motor else None
-        for use, given, key in zip(uses, inputs, keys, strict=True)
+        _build_motor(use.motor, driven.limits.effort, key) if use.motor else None
+        for use, driven, key in zip(uses, inputs, keys, strict=True)
     ]
     mechanism, start = _build_mechanism(parameters, uses, context)
     plays = {
@@ -437,7 +442,7 @@ def _build_mechanism(
     mechanism = SeveralDofMechanism(
         terms,
         METHODS[parameters.method].step,
-        tuple((given.limits.low, given.limits.high) for given in limits),
+        tuple((driven.limits.low, driven.limits.high) for driven in limits),
         parameters.restitution,
         mechanics.applied.laws if mechanics.applied else (),
         frictions=mechanics.dry_frictions,

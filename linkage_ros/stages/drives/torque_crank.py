@@ -140,8 +140,8 @@ class TorqueCrank(Crank):
         )
         self._motor, self._brake = motor, use.brake
         motors = [use.motor for use in uses]
-        self._delays = [round(one.delay * NANOSECONDS) if one else 0 for one in motors]
-        self._quanta = [one.quantum if one else 0.0 for one in motors]
+        self._delays = [round(motor.delay * NANOSECONDS) if motor else 0 for motor in motors]
+        self._quanta = [motor.quantum if motor else 0.0 for motor in motors]
         # The commands that wait: when they act, their inputs, and themselves.
         self._waiting: list[tuple[int, int, float]] = []
         self._commands: list[float | None] = [None] * len(uses)
@@ -155,8 +155,8 @@ class TorqueCrank(Crank):
         self._most = [
             LARGEST
             if use.motor and use.motor.command != 'effort'
-            else min(given.limits.effort, LARGEST)
-            for use, given in zip(uses, context.closure.linkage.inputs, strict=True)
+            else min(driven.limits.effort, LARGEST)
+            for use, driven in zip(uses, context.closure.linkage.inputs, strict=True)
         ]
         self.stamp = self.lost = self.saturated = 0
         self._acting = self.actuation_for(*self._commands)
@@ -232,7 +232,7 @@ class TorqueCrank(Crank):
             if wrench != held.wrench and now > self._time:
                 self._go_to(now)
         held.set_wrench(wrench, now)
-        self._loaded_until = min(each.until for each in self._wrenches)
+        self._loaded_until = min(wrench.until for wrench in self._wrenches)
 
     def state(self, now: int) -> CrankState:
         """

@@ -74,13 +74,13 @@ def first_values(closure: Closure) -> dict[int, Begin]:
     begins at its input.
     """
     bounds, joints = closure.bounds, list(closure.linkage.joints)
-    found: dict[int, Begin] = {
+    begins: dict[int, Begin] = {
         bound.number: bound.turn_to_middle for bound in bounds.joints if bound.middle is not None
     }
     for bound in bounds.inputs:
         if bound.name in joints and closure.turning[joints.index(bound.name)]:
-            found[joints.index(bound.name)] = float
-    return found
+            begins[joints.index(bound.name)] = float
+    return begins
 
 
 def wrap_all(turning: Sequence[bool]) -> Sensor:

@@ -73,8 +73,8 @@ class BacklashEffect(DriveEffect):
         """Build the stage; it stores the positions of the cranks."""
         linkage = context.closure.linkage
         plays = tuple(
-            Play(self.inputs.get(given.joint, self.play), turns=not given.slider)
-            for given in linkage.inputs
+            Play(self.inputs.get(driven.joint, self.play), turns=not driven.slider)
+            for driven in linkage.inputs
         )
 
         def backlash(motor: CrankState) -> CrankState:

@@ -109,10 +109,10 @@ class BiasEffect(SensorEffect):
             for joint in joints
         )
         systematic: tuple[_Systematic, ...] = tuple(
-            (i, self.scales.get(joint, 0.0), found.amplitude, found.phase)
+            (i, self.scales.get(joint, 0.0), eccentricity.amplitude, eccentricity.phase)
             for i, joint in enumerate(joints)
             if joint in self.scales or joint in self.eccentricities
-            for found in [self.eccentricities.get(joint, disc)]
+            for eccentricity in [self.eccentricities.get(joint, disc)]
         )
         of_rates = tuple(self.rates.get(joint, 0.0) for joint in joints)
         of_efforts = tuple(self.efforts.get(joint, 0.0) for joint in joints)

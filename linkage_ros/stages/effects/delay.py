@@ -125,7 +125,7 @@ class DelayEffect(JointDelay, SensorEffect):
 
     def refusal_beside(self, beside: Sequence[Effect | None]) -> DefinitionError | None:
         """Return an error for measurement stamps that cannot share one message of linkages."""
-        if self.stamp != 'measured' or all(other == self for other in beside):
+        if self.stamp != 'measured' or all(effect == self for effect in beside):
             return None
         return DefinitionError(
             'effects.delay.stamp',
@@ -229,11 +229,11 @@ class Delay:
     def _arriving_reading(self, now: int) -> SensorReading | None:
         due = now - self._delay
         if self._messages is not None and due >= self._messages:
-            found = self._next_due(due)
+            arrived = self._next_due(due)
         else:
-            found = self._look(due, self._arrived)
+            arrived = self._look(due, self._arrived)
         self._arrived = due
-        return found if found is None or self._measured else restamp(found, now)
+        return arrived if arrived is None or self._measured else restamp(arrived, now)
 
     def _next_due(self, due: int) -> SensorReading | None:
         """Return the first waiting reading, if it is due."""
@@ -269,10 +269,10 @@ class RandomDelay:
             self._send_reading(now, reading)
             if self._duplicates and self._random() < self._duplicates:
                 self._send_reading(now, reading)
-        found: SensorReading | None = None
+        arrived: SensorReading | None = None
         while self._way and self._way[0][0] <= now:
-            _, _, found = heappop(self._way)
-        return found if found is None or self._measured else restamp(found, now)
+            _, _, arrived = heappop(self._way)
+        return arrived if arrived is None or self._measured else restamp(arrived, now)
 
     def gap(self, now: int) -> SensorReading | None:
         """Return the arriving message at a time, in [ns], at which the linkage has no pose."""

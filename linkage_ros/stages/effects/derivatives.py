@@ -72,11 +72,11 @@ class AccelerationEffect(MechanismEffect, MessageEffect):
             velocity = motion.velocity
             if velocity is None:
                 return motion
-            found = acceleration_of(motion.position, velocity, *motion.crank.accelerations)
+            acceleration = acceleration_of(motion.position, velocity, *motion.crank.accelerations)
             # Near a toggle it grows with the cube of the factor of the rates, and may overflow.
-            if not all_finite(found.joints):
+            if not all_finite(acceleration.joints):
                 return motion
-            return motion._replace(acceleration=found)
+            return motion._replace(acceleration=acceleration)
 
         return acceleration
 

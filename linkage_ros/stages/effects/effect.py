@@ -85,7 +85,7 @@ class Effect(ABC):
         Reason and remedy of its refusal where the driven joints are not published; () if it does
         not need them.
     refused_drives
-        Drives beside which it is refused, each with the reason and the remedy.
+        Drives with which it is refused, each with the reason and the remedy.
     after
         Of a user-defined effect: the effect of this package after which it acts.
     sample
@@ -117,7 +117,7 @@ class Effect(ABC):
         return False
 
     def needs_here(self, _named: Collection[str], *, moves_by_rates: bool) -> tuple[str, ...]:
-        """Return the effects that it starts from, beside the named ones of its scene."""
+        """Return the effects that it starts from in a scene with the named ones."""
         return self.needs
 
     @property
@@ -182,7 +182,7 @@ class MechanismEffect(Effect):
 
 
 class ForceEffect(Effect):
-    """An effect on all that works with forces; it is no stage of the tick."""
+    """An effect on all that works with forces; it is not a stage of the tick."""
 
     __slots__ = ()
     place: ClassVar[str] = 'in the forces'
@@ -236,7 +236,7 @@ class MessageEffect(Effect):
     """
 
     __slots__ = ()
-    place: ClassVar[str] = 'beside the joint states'
+    place: ClassVar[str] = 'next to the joint states'
     topic: ClassVar[str] = ''
     message: ClassVar[str] = ''
     of_reading: ClassVar[bool] = False

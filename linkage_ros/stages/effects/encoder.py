@@ -97,7 +97,7 @@ class EncoderEffect(SensorEffect):
     @property
     def is_recoverable(self) -> bool:
         """Return whether it neither counts from power-on nor has a low-pass."""
-        return not self.cutoff and not any(each.incremental for each in self.joints.values())
+        return not self.cutoff and not any(encoder.incremental for encoder in self.joints.values())
 
     def sensor(self, context: Context) -> Sensor:
         """
@@ -214,16 +214,16 @@ class Encoder:
     def select_joints(self, places: Sequence[int]) -> Encoder:
         """Return a driver that reads the counts of these joints alone, at its own times."""
         counters = dict(self._counters)
-        found = [(at, counters[place]) for at, place in enumerate(places) if place in counters]
-        return Encoder(tuple(found), self._differenced)
+        selected = [(at, counters[place]) for at, place in enumerate(places) if place in counters]
+        return Encoder(tuple(selected), self._differenced)
 
     def __call__(self, now: int, reading: SensorReading) -> SensorReading:
         """Return the reading of the encoders."""
         values = list(reading.joints)
         for place, counter in self._counters:
             values[place] = counter.count_value(values[place])
-        found = reading._replace(joints=tuple(values))
-        return self.difference_rates(now, found) if self.read_at_ticks else found
+        counted = reading._replace(joints=tuple(values))
+        return self.difference_rates(now, counted) if self.read_at_ticks else counted
 
     def difference_rates(self, now: int, reading: SensorReading) -> SensorReading:
         """Return a reading with the rates that the driver computes, at a time in [ns]."""

@@ -165,8 +165,10 @@ class PinForcesEffect(MechanismEffect, MessageEffect):
             return write_forces
 
         def write_certain(now: int, motion: MechanismState, _reading: SensorReading) -> bytes:
-            found = motion.reactions
-            return write(now, [found[n] for n in forces.published_joints]) if found else b''
+            reactions = motion.reactions
+            return (
+                write(now, [reactions[n] for n in forces.published_joints]) if reactions else b''
+            )
 
         return write_certain
 
@@ -193,10 +195,10 @@ def _measured_effort_stage(named: Sequence[str], context: Context) -> Stage:
             return motion
         at = dict.fromkeys(published, 0.0)
         if carried is not None:
-            found = carried.carry_from(motion.position, efforts)
-            if not found:
+            carried_efforts = carried.carry_from(motion.position, efforts)
+            if not carried_efforts:
                 return motion
-            at |= dict(zip(named, found, strict=True))
+            at |= dict(zip(named, carried_efforts, strict=True))
         at |= dict(zip(inputs, efforts, strict=True))
         return motion._replace(efforts=tuple([at[name] for name in published]))
 

@@ -92,8 +92,8 @@ class Jitter:
         """Return the reading at a time, in [ns]."""
         history = self._history
         history.add(now, reading)
-        found = history.interpolate(max(now - self._earlier(), history.earliest_time))
-        return None if found is None else restamp(found, reading.stamp)
+        earlier = history.interpolate(max(now - self._earlier(), history.earliest_time))
+        return None if earlier is None else restamp(earlier, reading.stamp)
 
     def gap(self, now: int) -> None:
         """Record that the linkage has no pose at a time, in [ns]; nothing is read."""

@@ -119,7 +119,7 @@ class MarkerPile:
 
     def add_still(self, markers: Sequence[Marker]) -> None:
         """Add markers that do not move."""
-        self.still += [each._replace(lifetime=self._wanted.lifetimes[1]) for each in markers]
+        self.still += [marker._replace(lifetime=self._wanted.lifetimes[1]) for marker in markers]
 
     def add_traces(self, curves: Mapping[str, Sequence[Place]]) -> None:
         """Add a trail of each traced point; or else its whole curve, where that is known."""
@@ -192,19 +192,21 @@ class Arrows:
     def effort_arrow(self, arm: DriveArm, effort: float) -> list[Place]:
         """Return the arrow of an effort: an arc about the joint, or along it."""
         sign = 1.0 if effort > 0.0 else -1.0
-        one, other = arm.ways
+        along_arm, across_arm = arm.ways
         if arm.start is None:
             length = self._arrow_length(abs(effort))
-            end = plus(arm.at, scale(sign * length, one))
-            return self._add_head([arm.at, end], (scale(sign, one), other), length)
+            end = plus(arm.at, scale(sign * length, along_arm))
+            return self._add_head([arm.at, end], (scale(sign, along_arm), across_arm), length)
         length = self._arrow_length(abs(effort) / self._radius)
         turn = sign * min(length / self._radius, _WIDEST)
         steps = ARROW_POINTS - 4
         angles = [arm.start + turn * i / steps for i in range(steps)] + [arm.start + turn]
-        ways = [plus(scale(cos(angle), one), scale(sin(angle), other)) for angle in angles]
+        ways = [
+            plus(scale(cos(angle), along_arm), scale(sin(angle), across_arm)) for angle in angles
+        ]
         line = [plus(arm.at, scale(self._radius, way)) for way in ways]
         c, s = sign * cos(angles[-1]), sign * sin(angles[-1])
-        along = plus(scale(-s, one), scale(c, other))
+        along = plus(scale(-s, along_arm), scale(c, across_arm))
         return self._add_head(line, (along, ways[-1]), length)
 
     def _add_head(

@@ -128,22 +128,22 @@ class PlanarMarkers:
         return PlacedMarkers(
             [_flat_point(points[at]) for at in self._traced.values()],
             [_flat_point(points[at]) for at in self._joints],
-            [self._drive_arm(given, points, angles) for given in self._drives],
+            [self._drive_arm(driven, points, angles) for driven in self._drives],
         )
 
     def _drive_arm(
-        self, given: Input, points: Mapping[tuple[str, str], complex], angles: Mapping[str, float]
+        self, driven: Input, points: Mapping[tuple[str, str], complex], angles: Mapping[str, float]
     ) -> DriveArm:
         linkage, blocks = self._closure.linkage, self._closure.structure.blocks
-        if given.slider:
-            slider = linkage.sliders[given.slider]
+        if driven.slider:
+            slider = linkage.sliders[driven.slider]
             way = rect(1.0, angles[slider.along]) * slider.unit
-            start = points[blocks[given.slider], slider.point]
+            start = points[blocks[driven.slider], slider.point]
             return DriveArm(_flat_point(start), (_flat_point(way), _flat_point(way * 1j)))
         links = linkage.links
-        pin = next(point for point in links[given.parent] if point in links[given.child])
-        centre = _flat_point(points[given.child, pin])
-        return DriveArm(centre, (_X, _Y), angles[given.child])
+        pin = next(point for point in links[driven.parent] if point in links[driven.child])
+        centre = _flat_point(points[driven.child, pin])
+        return DriveArm(centre, (_X, _Y), angles[driven.child])
 
 
 def _body_markers(
@@ -157,13 +157,13 @@ def _body_markers(
     anchors = {link: _Key(link, next(iter(p))) for link, p in closure.structure.links.items()}
     ids: Counter[str] = Counter()
     whole, edge_line = (1.0, 1.0, 1.0), (0.16 * pile.size, 0.0, 0.0)
-    found = []
+    bodies = []
 
     def add_body(link: str, marker: Marker) -> None:
         marker = marker._replace(number=ids[marker.ns])
         ids[marker.ns] += 1
         filled = marker.kind == TRIANGLE_LIST
-        found.append(_MarkerBody(pile.add(marker), anchors[link], marker.colour, filled))
+        bodies.append(_MarkerBody(pile.add(marker), anchors[link], marker.colour, filled))
 
     for link, shape in drawn:
         if link == GROUND or isinstance(shape, Circle):
@@ -180,7 +180,7 @@ def _body_markers(
         z = pile.z + 0.2 * pile.layer
         add_body(link, Marker('edges', 0, LINE_STRIP, edge_line, EDGE, edge, (0.0, 0.0, z)))
         pile.z += pile.layer
-    return tuple(found)
+    return tuple(bodies)
 
 
 def _pin_markers(pile: MarkerPile, count: int) -> tuple[int, int]:
@@ -201,11 +201,11 @@ def _ground_markers(drawn: Sequence[Shape], size: float) -> list[Marker]:
         _flat_point(q) for shape in drawn for ends in pairwise(shape_outline(shape)) for q in ends
     ]
     whole, thin = (1.0, 1.0, 1.0), (0.16 * size, 0.0, 0.0)
-    found = [
+    markers = [
         Marker('ground', 0, TRIANGLE_LIST, whole, rgba(FACES['ground']), area),
         Marker('ground', 1, LINE_LIST, thin, HATCHED, lines),
     ]
-    return [marker for marker in found if marker.points]
+    return [marker for marker in markers if marker.points]
 
 
 def _traced_points(closure: PlanarClosure) -> dict[str, _Key]:
@@ -216,10 +216,10 @@ def _traced_points(closure: PlanarClosure) -> dict[str, _Key]:
 
 def _fan_triangles(corners: Sequence[Place]) -> list[Place]:
     """Return the corners of triangles that fill a convex area, seen from above."""
-    found = []
+    fan = []
     for i in range(1, len(corners) - 1):
-        found += [corners[0], corners[i], corners[i + 1]]
-    return found
+        fan += [corners[0], corners[i], corners[i + 1]]
+    return fan
 
 
 def _flat_point(place: complex) -> Place:

@@ -113,7 +113,7 @@ class Markers:
         )
         self._figure = figure = _markers_of(closure, wanted)
         self._pile = pile = figure.pile
-        mass = sum(each.mass for each in closure.linkage.masses.values())
+        mass = sum(body.mass for body in closure.linkage.masses.values())
         self._arrows = Arrows(use.force_scale, mass, pile)
         self._moving = MarkerArrayWriter(self._frame, pile.markers)
         self._full = MarkerArrayWriter(self._frame, (*pile.markers, *pile.still))

@@ -78,9 +78,9 @@ class MeasuringRangeEffect(SensorEffect):
                     'write the lower limit as low',
                 )
         ranges = [self.joints.get(joint, JointRange()) for joint in context.joints]
-        positions = tuple((each.low, each.high) for each in ranges)
-        rates = tuple((-each.rate, each.rate) for each in ranges)
-        efforts = tuple((-each.effort, each.effort) for each in ranges)
+        positions = tuple((bounds.low, bounds.high) for bounds in ranges)
+        rates = tuple((-bounds.rate, bounds.rate) for bounds in ranges)
+        efforts = tuple((-bounds.effort, bounds.effort) for bounds in ranges)
 
         def measuring_range(_now: int, reading: SensorReading) -> SensorReading:
             return reading._replace(

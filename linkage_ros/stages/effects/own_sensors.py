@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Own sensors: joints that have their own sensors, beside the sensor of the other joints.
+Own sensors: joints that have their own sensors, apart from the sensor of the other joints.
 
 A joint under ``joints`` of `rate_limit`, `dropout` or `delay` has its own sensor, with
 its own parameters (those that it leaves out have their defaults) and its own random generator. So
@@ -107,18 +107,18 @@ class OwnSensors:
     def __call__(self, now: int, reading: SensorReading) -> SensorReading | None:
         """Return the newest readings of all; None if none is new."""
         new = reading.new if isinstance(reading, PartlyNew) else None
-        found = []
+        readings = []
         for places, sensor in self._groups:
             if new is None or not new.isdisjoint(places):
-                found.append(sensor(now, _select_joints(reading, places)))
+                readings.append(sensor(now, _select_joints(reading, places)))
             else:
-                found.append(sensor.silence(now, False) if self.silence is not None else None)
-        return self._newest_reading(found)
+                readings.append(sensor.silence(now, False) if self.silence is not None else None)
+        return self._newest_reading(readings)
 
     def _read_gap(self, now: int) -> SensorReading | None:
-        found = [sensor.gap(now) for _, sensor in self._groups]
-        newest = self._newest_reading(found)
-        unseen = newest is None and any(part is not None for part in found)
+        gaps = [sensor.gap(now) for _, sensor in self._groups]
+        newest = self._newest_reading(gaps)
+        unseen = newest is None and any(part is not None for part in gaps)
         self.gap_begins = unseen or any(sensor.gap_begins for _, sensor in self._groups)
         return newest
 
@@ -127,21 +127,21 @@ class OwnSensors:
             return self._read_gap(now)
         return self._newest_reading([sensor.silence(now, False) for _, sensor in self._groups])
 
-    def _newest_reading(self, found: Sequence[SensorReading | None]) -> SensorReading | None:
+    def _newest_reading(self, readings: Sequence[SensorReading | None]) -> SensorReading | None:
         """Return what is held of all joints; None if no reading is new, or one is missing."""
         stamp = None
-        for index, part in enumerate(found):
+        for index, part in enumerate(readings):
             if part is not None:
                 self._held[index], stamp = part, part.stamp
         held = [part for part in self._held if part is not None]
-        if stamp is None or len(held) < len(found):
+        if stamp is None or len(held) < len(readings):
             return None
         _, *values = zip(*held, strict=True)
         reading = PartlyNew(stamp, *map(self._join_values, values))
-        if None in found:
+        if None in readings:
             reading.new = frozenset(
                 place
-                for (places, _), part in zip(self._groups, found, strict=True)
+                for (places, _), part in zip(self._groups, readings, strict=True)
                 if part is not None
                 for place in places
             )

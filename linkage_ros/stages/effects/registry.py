@@ -49,11 +49,11 @@ def needed_effects(effect: str) -> tuple[str, ...]:
 
 def effects_requiring(name: str, named: Collection[str]) -> tuple[str, ...]:
     """Return the named effects that add another one to the scene."""
-    own = [other for other in named if '.' in other or other in EFFECTS]
+    own = [effect for effect in named if '.' in effect or effect in EFFECTS]
     return tuple(
-        other
-        for other in in_order(own)
-        if name in (*needed_effects(other), *effect_class(other).publishes_with)
+        effect
+        for effect in in_order(own)
+        if name in (*needed_effects(effect), *effect_class(effect).publishes_with)
     )
 
 

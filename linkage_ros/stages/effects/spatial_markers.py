@@ -94,7 +94,7 @@ class SpatialMarkers:
         pile.add_status((0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])))
         self.groups = tuple(frozenset(group.links) for group in closure.groups)
         self._joints = closure.point_tracker([joint.point for joint in wanted.joints])
-        self._drives = [self._drive_arm(closure, given) for given in wanted.inputs]
+        self._drives = [self._drive_arm(closure, driven) for driven in wanted.inputs]
 
     def place(
         self, write: MarkerArrayWriter, position: Position, red: Collection[str]
@@ -118,7 +118,7 @@ class SpatialMarkers:
 
     def _moved_parts(self) -> list[_PlacedPart]:
         """Add a marker for each part, which moves; return them."""
-        drawing, size, found = self._drawing, self._drawing.size, []
+        drawing, size, parts = self._drawing, self._drawing.size, []
         bodies, numbers = {id(part) for part in drawing.bodies}, Counter[str]()
         for part in drawing.parts:
             ns = 'links' if id(part) in bodies else 'joints'
@@ -134,33 +134,33 @@ class SpatialMarkers:
             marker = Marker(ns, numbers[ns], kind, scale, colour, points)
             numbers[ns] += 1
             link = part.name if ns == 'links' else ''
-            found.append(_PlacedPart(self.pile.add(marker), rows, link, colour))
-        return found
+            parts.append(_PlacedPart(self.pile.add(marker), rows, link, colour))
+        return parts
 
-    def _drive_arm(self, closure: SpaceClosure, given: Input) -> Callable[[Position], DriveArm]:
+    def _drive_arm(self, closure: SpaceClosure, driven: Input) -> Callable[[Position], DriveArm]:
         """Return a function that says where the effort of an input is shown at a position."""
         linkage, drawing = closure.linkage, self._drawing
-        row = drawing.joints.get(given.joint, 0)
-        if given.joint in linkage.struts:
-            one, other = (drawing.points[end] for end in linkage.struts[given.joint])
+        row = drawing.joints.get(driven.joint, 0)
+        if driven.joint in linkage.struts:
+            start_point, end_point = (drawing.points[end] for end in linkage.struts[driven.joint])
 
             def along_strut(_position: Position) -> DriveArm:
-                start, end = (self._places[each].tolist() for each in (one, other))
+                start, end = (self._places[point].tolist() for point in (start_point, end_point))
                 way = direction_of(minus(end, start))
                 return DriveArm(end, (way, unit_across(way)))
 
             return along_strut
-        joint = linkage.pair_joints[given.joint]
+        joint = linkage.pair_joints[driven.joint]
         axis = direction_of(joint.axis)
         way = closure.carried_vector(joint.parent, axis)
         # An arc begins at the link, and turns with it.
         side = closure.carried_vector(
-            joint.parent if given.slider else joint.child, unit_across(axis)
+            joint.parent if driven.slider else joint.child, unit_across(axis)
         )
 
         def at_joint(position: Position) -> DriveArm:
             at, along, across = self._places[row].tolist(), way(position), side(position)
-            if given.slider:
+            if driven.slider:
                 return DriveArm(at, (along, across))
             return DriveArm(at, (across, cross(along, across)), 0.0)
 
@@ -187,15 +187,15 @@ def _hull_triangles(places: NDArray[np.float64]) -> list[int]:
     if extents[1] <= flat:
         return []
     if extents[2] <= flat:
-        seen = [complex(*each) for each in (away @ axes[:2].T).tolist()]
+        seen = [complex(*place) for place in (away @ axes[:2].T).tolist()]
         first, *rim = [seen.index(corner) for corner in convex_hull(seen)]
         return [i for pair in pairwise(rim) for i in (first, *pair)]
-    found: list[int] = []
+    corners_found: list[int] = []
     for corners in combinations(range(len(places)), 3):
-        one, other, third = away[list(corners)]
-        normal = np.cross(other - one, third - one)
-        above = (away - one) @ normal
+        first_place, second, third = away[list(corners)]
+        normal = np.cross(second - first_place, third - first_place)
+        above = (away - first_place) @ normal
         slack = _FLAT * extents[0] ** 3
         if np.linalg.norm(normal) * extents[0] > slack and min(above.max(), -above.min()) <= slack:
-            found += corners
-    return found
+            corners_found += corners
+    return corners_found

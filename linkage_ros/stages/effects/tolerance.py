@@ -94,11 +94,11 @@ class ToleranceEffect(LinkageEffect):
             from linkage_ros.kinematics import put_together  # local import: loads numpy
 
             holes = linkage.holes
-            found: Any = {hole: self._deviation_of(hole, 3, random) for hole in holes}
-            if not any(map(any, found.values())):
+            deviations: Any = {hole: self._deviation_of(hole, 3, random) for hole in holes}
+            if not any(map(any, deviations.values())):
                 return linkage
             try:
-                altered = put_together(linkage, found)
+                altered = put_together(linkage, deviations)
             except DefinitionError as error:
                 raise _closing_error(error) from None
         else:

@@ -131,7 +131,7 @@ def _find_class(name: str, module: ModuleType) -> type[Effect]:
     bases = list_names([base.__name__ for base in BASES])
     if not defined:
         raise DefinitionError(name, 'defines no effect', f'derive a class from one of {bases}')
-    several = list_names([each.__name__ for each in defined], ' and ')
+    several = list_names([effect.__name__ for effect in defined], ' and ')
     raise DefinitionError(
         name, f'defines the effects {several}', 'leave one, and give each of the others a module'
     )
@@ -182,7 +182,7 @@ def _check_order(name: str, effect: type[Effect]) -> None:
         raise DefinitionError(name, f'{said}: that is not an effect', remedy)
     for need in needs:
         if need not in EFFECTS or not _is_quantity(need):
-            quantities = [each for each in EFFECTS if _is_quantity(each)]
+            quantities = [effect for effect in EFFECTS if _is_quantity(effect)]
             raise DefinitionError(
                 name, f'needs {quote(need)}', f'name some of {list_names(quantities)}'
             )
