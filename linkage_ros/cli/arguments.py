@@ -65,8 +65,8 @@ def add_robot(parser: argparse.ArgumentParser) -> None:
         ('--close', 'FRAME=FRAME', str, close),
         ('--start', 'JOINT=VALUE', read_joint_value, start),
     ):
-        given: dict[str, Any] = {'type': kind, 'default': [], 'metavar': name, 'help': text}
-        robot.add_argument(option, action='append', **given)
+        settings: dict[str, Any] = {'type': kind, 'default': [], 'metavar': name, 'help': text}
+        robot.add_argument(option, action='append', **settings)
     near = 'take a pose near it in which the loops close'
     robot.add_argument('--near', action='store_true', help=near)
 
@@ -248,15 +248,15 @@ def read_inputs(
 
     A LinkageError is raised if there are more or fewer values than inputs.
     """
-    given = linkage.inputs
-    if len(typed) != len(given):
+    inputs = linkage.inputs
+    if len(typed) != len(inputs):
         raise LinkageError(
             f'{option} {" ".join(f"{value:g}" for value in typed)}',
-            f'{len(typed)} value(s) for {len(given)} input(s)',
-            f'write {option} {" ".join(driven.joint.upper() for driven in given)}',
+            f'{len(typed)} value(s) for {len(inputs)} input(s)',
+            f'write {option} {" ".join(driven.joint.upper() for driven in inputs)}',
         )
     return tuple(
-        units.to_si(value, driven.unit) for value, driven in zip(typed, given, strict=True)
+        units.to_si(value, driven.unit) for value, driven in zip(typed, inputs, strict=True)
     )
 
 
@@ -329,7 +329,7 @@ class DisplayUnits(NamedTuple):
         """Return a text whose angles, such as ``-1.5°``, are in this unit."""
         if self.in_degrees:
             return text
-        return _IN_DEGREES.sub(lambda one: f'{radians(float(one[1])):.6g} rad', text)
+        return _IN_DEGREES.sub(lambda match: f'{radians(float(match[1])):.6g} rad', text)
 
     def format_angle(self, angle: float, digits: int = 3) -> str:
         """Return an angle in [rad] as text; ``digits`` are the decimals of degrees."""

@@ -50,7 +50,7 @@ from linkage_ros.replay import recorded_scene, WorstResiduals
 from linkage_ros.signals import heed_signals, StoppedError
 
 _MIB = 2**20
-_BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its content
+_BESIDE = 47  # bytes that a message takes in an MCAP file and its index, without its content
 
 _GAP = 'what depends on a missing one may differ'
 
@@ -106,7 +106,7 @@ def scene_of(bag: Bag, *, trust_effects: bool, settings: Sequence[str] = ()) -> 
 
 
 def path_beside(bag: Path, suffix: str) -> Path:
-    """Return the path beside the bag that has its name and this suffix."""
+    """Return the path next to the bag that has its name and this suffix."""
     # The current folder, '.', has no name.
     named = bag if bag.name not in ('', '..') else bag.resolve()
     return named.with_name(named.name + suffix) if named.name else named
@@ -223,9 +223,9 @@ def bag_json(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, A
             {
                 'name': topic.name,
                 'type': topic.type,
-                'messages': each.messages,
-                'rate_hz': each.mean_rate,
-                'size_bytes': each.size,
+                'messages': topic_record.messages,
+                'rate_hz': topic_record.mean_rate,
+                'size_bytes': topic_record.size,
                 'reliability': topic.qos.reliability,
                 'durability': topic.qos.durability,
                 'qos_understood': topic.qos.understood,
@@ -235,8 +235,8 @@ def bag_json(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, A
                 if discarded or counted['received']
                 else None,
             }
-            for each in contents.topics
-            for topic in [each.topic]
+            for topic_record in contents.topics
+            for topic in [topic_record.topic]
         ],
         'versions': {
             'linkage_ros': _text_or_none(run.get('linkage_ros')),
@@ -316,8 +316,8 @@ def _linkage_json(scene_linkage: SceneLinkage) -> dict[str, Any]:
         'name': scene_linkage.name,
         'links': len(linkage.link_names),
         'inputs': [
-            {'joint': name, 'unit': given.unit}
-            for name, given in zip(scene_linkage.input_names, linkage.inputs, strict=True)
+            {'joint': name, 'unit': driven.unit}
+            for name, driven in zip(scene_linkage.input_names, linkage.inputs, strict=True)
         ],
         'joints': list(scene_linkage.joint_names),
         'drive': scene_linkage.drive[0],

@@ -69,7 +69,7 @@ _AFTERWARDS = 3.0
 
 _PATIENCE = 20.0
 """How long the demo's duration waits for the first message for the crank, in [s]: a busy machine
-takes seconds to start the process beside it."""
+takes seconds to start the second process."""
 
 EXAMPLE = 'linkage demo fault_drill --seconds 10'
 

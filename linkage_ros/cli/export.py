@@ -133,7 +133,7 @@ def survey_columns(
             counts[topic] += 1
             if values.keys not in known:
                 keys = enumerate(values.keys)
-                known[values.keys] = [one for one in keys if one[1][1] in IN_SPACE]
+                known[values.keys] = [key for key in keys if key[1][1] in IN_SPACE]
                 columns |= dict.fromkeys(key for key in values.keys if key[1] not in IN_SPACE)
                 if max(len(columns), len(known)) > _MOST_COLUMNS:
                     raise BagError(
@@ -270,33 +270,33 @@ def export_bag(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Ex
 
     size = sum(layout_of(path).content for path in bag.files) // _MIB
     with show_progress('columns looked for [MiB]') as advance:
-        found = survey_columns(
+        survey = survey_columns(
             source, [] if scene is None else scene.joint_names, bounded_progress(advance, size)
         )
-    if not found.rows:
-        raise _nothing_error(source, found)
-    columns = [shown_unit(units, unit_in_si(key, turning)) for key in found.keys]
+    if not survey.rows:
+        raise _nothing_error(source, survey)
+    columns = [shown_unit(units, unit_in_si(key, turning)) for key in survey.keys]
     heads = [
         TIME,
         STAMP,
         PUBLISHED,
         LOGGED,
-        *(_column_heading(key, unit) for key, (unit, _) in zip(found.keys, columns, strict=True)),
+        *(_column_heading(key, unit) for key, (unit, _) in zip(survey.keys, columns, strict=True)),
     ]
-    converted = [(place, one) for place, (_, one) in enumerate(columns, 4) if one != 1.0]
+    converted = [(place, unit) for place, (_, unit) in enumerate(columns, 4) if unit != 1.0]
     with (
         table_file(file, heads, (STAMP, PUBLISHED, LOGGED)) as write,
         show_progress('written [MiB]') as advance,
     ):
-        rows = rows_of(source, found.keys, bounded_progress(advance, size))
+        rows = rows_of(source, survey.keys, bounded_progress(advance, size))
         while block := list(islice(rows, block_rows(len(heads)))):
             for row in block if converted else ():
-                for place, one in converted:
+                for place, factor in converted:
                     value = row[place]
                     if value is not None:
-                        row[place] = value / one
+                        row[place] = value / factor
             write(block)
-    return found
+    return survey
 
 
 def shown_unit(units: Units, unit: str) -> tuple[str, float]:
@@ -320,7 +320,7 @@ def _scene_or_none(bag: Bag) -> Scene | None:
 
 def _choose_topics(bag: Bag, scene: Scene | None, topic: str | None) -> ExportSource:
     """Return the topics to write: as asked for, or as the bag names them."""
-    types = {each.name: each.type for each in bag.topics}
+    types = {topic.name: topic.type for topic in bag.topics}
     readable = {name: kind for name, kind in types.items() if kind in TYPES}
     run = run_or_blank(bag)
     if topic is not None:

@@ -103,8 +103,8 @@ def _copied_files(file: Path, output: Path) -> dict[Path, str]:
     """
     text = _SCHEMA.sub('', file.read_text('utf-8'))
     copies = {output: _REFERENCE.sub(r'\1\3', text)}
-    for found in _REFERENCE.finditer(text):
-        copy, linkage = output.with_name(found[3]), shipped_path(found[2] + found[3])
+    for reference in _REFERENCE.finditer(text):
+        copy, linkage = output.with_name(reference[3]), shipped_path(reference[2] + reference[3])
         linkage_text = _SCHEMA.sub('', linkage.read_text('utf-8'))
         if copy == output or (copy.exists() and copy.read_bytes() != linkage_text.encode()):
             raise FileError(

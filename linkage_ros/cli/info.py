@@ -119,7 +119,7 @@ def bag_tables(
     columns = (*_TOPIC, *counters, Column('QoS', 'qos'))
     rows = ({**topic, 'qos': _qos_text(topic)} for topic in account['topics'])
     yield table_of_rows('Topics', 'topics', columns, rows)
-    files = [each.linkage_content.units for each in scene.linkages] if scene else []
+    files = [linkage.linkage_content.units for linkage in scene.linkages] if scene else []
     for index, linkage in enumerate((account['scene'] or {'linkages': []})['linkages']):
         units = units.of_file(files[index]) if files else units
         title = f'Linkage {linkage["name"]}' if linkage['name'] else 'Linkage'
@@ -191,7 +191,7 @@ def _linkage_rows(
     own = [f'{name} (not imported)' for name in linkage['effects_not_imported']]
     yield 'effects', ', '.join([*linkage['effects'], *own]) or 'none'
     inputs = linkage['inputs']
-    yield 'drive', f'{linkage["drive"]}, of {", ".join(given["joint"] for given in inputs)}'
+    yield 'drive', f'{linkage["drive"]}, of {", ".join(driven["joint"] for driven in inputs)}'
     if 'states' not in linkage:
         return
     toggles = f', {linkage["toggles"]} of them at a toggle' if linkage['toggles'] else ''
@@ -215,27 +215,27 @@ def _lengths_text(lengths: list[float], units: DisplayUnits) -> str:
 
 
 def _event_text(
-    found: dict[str, Any], inputs: list[dict[str, str]], begin: int | None, units: DisplayUnits
+    event: dict[str, Any], inputs: list[dict[str, str]], begin: int | None, units: DisplayUnits
 ) -> str:
     """Return the time and place of an event."""
     values = ', '.join(
-        f'{given["joint"]} {_input_text(value, given, units)}'
-        for given, value in zip(inputs, found['inputs'], strict=True)
+        f'{driven["joint"]} {_input_text(value, driven, units)}'
+        for driven, value in zip(inputs, event['inputs'], strict=True)
     )
-    return f'at {(found["time_ns"] - (begin or 0)) / 1e9:+.6f} s, {values}'
+    return f'at {(event["time_ns"] - (begin or 0)) / 1e9:+.6f} s, {values}'
 
 
-def _input_text(value: float, given: dict[str, str], units: DisplayUnits) -> str:
-    turning = given['unit'] == 'rad'
+def _input_text(value: float, driven: dict[str, str], units: DisplayUnits) -> str:
+    turning = driven['unit'] == 'rad'
     return units.value_text(wrap_angle(value) if turning else value, turning)
 
 
-def _compression_text(found: dict[str, Any]) -> str:
-    if found['name'] == 'none':
+def _compression_text(compression: dict[str, Any]) -> str:
+    if compression['name'] == 'none':
         return 'none'
     return (
-        f'{escape_unprintable(found["name"])}, {found["content_bytes"]} bytes in '
-        f'{found["stored_bytes"]}'
+        f'{escape_unprintable(compression["name"])}, {compression["content_bytes"]} bytes in '
+        f'{compression["stored_bytes"]}'
     )
 
 

@@ -36,19 +36,19 @@ def linkage_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[t
 
 def _planar_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
     blocks, inputs = account['slot_blocks'], account['inputs']
-    beside = f' and {blocks} block(s) in slots' if blocks else ''
-    yield 'moving links', f'{account["moving_links"]}{beside}'
+    slot_blocks = f' and {blocks} block(s) in slots' if blocks else ''
+    yield 'moving links', f'{account["moving_links"]}{slot_blocks}'
     twice = ' (one of three links counts twice)' if account['shared_pins'] else ''
     yield 'joints', f'{account["pins"]} pins{twice}, {account["sliders"]} sliders'
     yield 'loops', str(account['loops'])
     yield 'degrees of freedom', f'{account["degrees_of_freedom"]}, as many as there are inputs'
-    for given in inputs:
+    for driven_joint in inputs:
         driven = (
-            f'slide of {given["slider"]} [{units.length}]'
-            if given['slider']
-            else f'angle of {given["child"]} to {given["parent"]}'
+            f'slide of {driven_joint["slider"]} [{units.length}]'
+            if driven_joint['slider']
+            else f'angle of {driven_joint["child"]} to {driven_joint["parent"]}'
         )
-        yield 'input', f'{given["joint"]}: {driven}'
+        yield 'input', f'{driven_joint["joint"]}: {driven}'
     if account.get('plane'):
         yield 'plane', ' and '.join(account['plane'])
         yield from _correction_facts(account, units)
@@ -67,10 +67,10 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
         yield 'rods that may spin', ', '.join(account['spinning_rods'])
     if account['held_joints']:
         yield 'held still', f'{", ".join(account["held_joints"])}: turns that move nothing else'
-    for given in account['inputs']:
-        turns = given['unit'] == 'rad'
+    for driven in account['inputs']:
+        turns = driven['unit'] == 'rad'
         unit = 'angle' if turns else f'length [{units.length}]'
-        yield 'input', f'{given["joint"]}: {unit}'
+        yield 'input', f'{driven["joint"]}: {unit}'
     if account['redundant_equations']:
         count = account['redundant_equations']
         equations = f'{count} equation{"s" * (count != 1)}'
@@ -105,11 +105,13 @@ def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tu
     """Yield the limits, the range, its singular places and the worst residual."""
     for limits in account['limits']:
         yield 'limits', f'{limits["joint"]}: {_limits_text(limits, units)}'
-    for one in account['reached']:
-        low, high = (units.value_text(one[end], one['unit'] == 'rad') for end in ('low', 'high'))
-        closing = '' if one['closes'] else ', where the loops close'
-        within = f'within the limits of {", ".join(one["within"])}{closing}'
-        yield 'reached', f'{one["joint"]}: {low} to {high}, {within}'
+    for reached in account['reached']:
+        low, high = (
+            units.value_text(reached[end], reached['unit'] == 'rad') for end in ('low', 'high')
+        )
+        closing = '' if reached['closes'] else ', where the loops close'
+        within = f'within the limits of {", ".join(reached["within"])}{closing}'
+        yield 'reached', f'{reached["joint"]}: {low} to {high}, {within}'
     yield from _range_facts(account, units)
     worst = account['worst_residual']
     if worst is None:
@@ -118,8 +120,8 @@ def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tu
 
     def place_text(inputs: Sequence[float]) -> str:
         return ', '.join(
-            units.value_text(value, given['unit'] == 'rad')
-            for value, given in zip(inputs, account['inputs'], strict=True)
+            units.value_text(value, driven['unit'] == 'rad')
+            for value, driven in zip(inputs, account['inputs'], strict=True)
         )
 
     if (nearest := account['nearest_singularity']) and nearest['group']:
@@ -144,31 +146,38 @@ def _range_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tu
     for interval in account['ranges']:
         turns = round((interval['high'] - interval['low']) / tau)
         if not interval['whole']:
-            each = '; each turn has different poses' if turning and not interval['turns'] else ''
-            followed = any(interval['limited']) or not each
+            other_poses = (
+                '; each turn has different poses' if turning and not interval['turns'] else ''
+            )
+            followed = any(interval['limited']) or not other_poses
             ends = '' if followed else ', and was not followed farther'
-            yield 'range', f'{_range_text(interval, turning, units)}{each}{ends}'
+            yield 'range', f'{_range_text(interval, turning, units)}{other_poses}{ends}'
         elif turns > 1:
             count = 'two' if turns == 2 else str(turns)
             yield 'range', f'every angle; the motion repeats after {count} turns'
         else:
             yield 'range', 'every angle'
     for status, name in _SINGULAR.items():
-        found = sorted(
-            (not one['within_limits'], _brought_within(one['input'], account['ranges'], turning))
-            for one in account['singular_inputs']
-            if one['status'] == status.value
+        singular = sorted(
+            (
+                not place['within_limits'],
+                _brought_within(place['input'], account['ranges'], turning),
+            )
+            for place in account['singular_inputs']
+            if place['status'] == status.value
         )
         places = [
             units.value_text(value, turning) + (' beyond the limits' if beyond else '')
-            for beyond, value in found
+            for beyond, value in singular
         ]
         if places or status is not Status.INDETERMINATE:
             yield name, ', '.join(places) or 'none'
-    for each in account['turning_points']:
-        at = sorted(_brought_within(one, account['ranges'], turning) for one in each['inputs'])
+    for turning_point in account['turning_points']:
+        at = sorted(
+            _brought_within(place, account['ranges'], turning) for place in turning_point['inputs']
+        )
         places = [units.value_text(value, turning) for value in at]
-        yield 'turns back', f'{each["joint"]} at {", ".join(places)}'
+        yield 'turns back', f'{turning_point["joint"]} at {", ".join(places)}'
 
 
 def _brought_within(value: float, ranges: Sequence[Mapping[str, Any]], turning: bool) -> float:

@@ -80,7 +80,7 @@ EXIT_CODES = {
 }
 """The exit codes of all commands."""
 
-# A word that is no option: argparse itself takes -1e-5 for one.
+# A word that is not an option: argparse itself takes -1e-5 for one.
 _NEGATIVE = re.compile(r'-\.?\d')
 
 # What argparse says of a value that its type does not read.
@@ -92,9 +92,9 @@ def find_command(name: str) -> ModuleType:
     return find_tool(name) if name in TOOLS else import_module(f'linkage_ros.cli.{name}')
 
 
-def _in_plain_words(found: re.Match[str]) -> str:
-    kind = 'whole number' if found[1] or 'int value' in found[0] else 'number'
-    return f'{found[2]} is not a {kind}{decimal_comma(found[3])}'
+def _in_plain_words(match: re.Match[str]) -> str:
+    kind = 'whole number' if match[1] or 'int value' in match[0] else 'number'
+    return f'{match[2]} is not a {kind}{decimal_comma(match[3])}'
 
 
 class Parser(argparse.ArgumentParser):
@@ -108,7 +108,7 @@ class Parser(argparse.ArgumentParser):
         """Parse; refuse unknown options first, which argparse reports only after all others."""
         options = [option for action in self._actions for option in action.option_strings]
         for word in args or ():
-            if word in ('--', '--ros-args'):  # what follows are no options of this command
+            if word in ('--', '--ros-args'):  # what follows is for ROS
                 break
             name = word.partition('=')[0]
             if name.startswith('--') and not any(option.startswith(name) for option in options):

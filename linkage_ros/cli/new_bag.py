@@ -101,10 +101,10 @@ def names_for(source: ReplaySource, scene: Scene, counterfactual: Counterfactual
         own = source.recorded.joint_names if source.recorded is not None else ()
         if run.crank_topic != joint_states or scene.joint_names != own:
             joint_states = f'{node}/joint_states'
-    given = {JOINT_STATES: joint_states, CRANK: source.crank_topic}
+    chosen = {JOINT_STATES: joint_states, CRANK: source.crank_topic}
     left_out = {DIAGNOSTICS} if run.resets_topic else {DIAGNOSTICS, RESETS}
     return {
-        topic: given.get(topic.key) or pairs.get(topic.name) or f'{node}{topic.name[1:]}'
+        topic: chosen.get(topic.key) or pairs.get(topic.name) or f'{node}{topic.name[1:]}'
         for topic in counterfactual.topics
         if topic.key not in left_out
     }

@@ -15,7 +15,7 @@ metadata promise; 1: undecided, stopped, or the bag is damaged and the part befo
 the same.
 
 --scene runs another scene, --set the scene of the bag with other values; its joints are compared
-with the recorded ones, tick by tick. The scene of the bag runs beside it: if it differs from
+with the recorded ones, tick by tick. The scene of the bag runs too: if it differs from
 its own run, as at another rate or where the bag lacks the start, the first line says by how
 much. -o writes a new bag, which replays by itself. Then a difference is not a failure.
 """
@@ -243,7 +243,7 @@ _TOPIC = (
 
 def _topics_table(account: Mapping[str, Any]) -> Table:
     turned = any(topic['same_but_for_turns'] for topic in account['topics'])
-    columns = [one for one in _TOPIC if turned or one.key != 'same_but_for_turns']
+    columns = [column for column in _TOPIC if turned or column.key != 'same_but_for_turns']
     return table_of_rows('', 'topics', columns, account['topics'])
 
 
@@ -380,7 +380,7 @@ def _replayed_with(
         'crank_topic': topic,
         'unchanged': _unchanged_account(unchanged, bag, run, scene, recorded, turning),
         'joint_states': published,
-        'topics': [attributes_json(each, _TOPIC) for each in comparison.topics],
+        'topics': [attributes_json(topic, _TOPIC) for topic in comparison.topics],
         'joints': joints_account(comparison, turning),
         'joints_only_recorded': [
             name for name in recorded_joints if name not in scene.joint_names
@@ -475,16 +475,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Replay the bag; return the exit code that the module docstring describes."""
-    other = arguments.scene is not None or bool(arguments.set)
+    is_counterfactual = arguments.scene is not None or bool(arguments.set)
     new_bag = arguments.output
     if new_bag is not None and new_bag.suffix.lower() in RESULTS:
         new_bag = None
     for option, value in (('-o', new_bag), ('--crank-topic', arguments.crank_topic)):
-        if value is not None and not other:
+        if value is not None and not is_counterfactual:
             raise LinkageError(option, 'is for another scene', 'name it with --scene or --set')
     bag = open_bag(arguments.bag, stop)
     reading = BagReading(bag, stop)
-    if not other:
+    if not is_counterfactual:
         scene = _own_scene(bag, arguments)
         account = replay_report(bag, reading, scene)
         code = {IDENTICAL: 0, DIFFERENT: EXIT_DIFFERENT}.get(account['verdict'], EXIT_INCOMPLETE)
@@ -502,7 +502,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             force=arguments.force,
         )
         code = 0
-    parts = (_counterfactual_parts if other else _proof_parts)(account, scene.units)
+    parts = (_counterfactual_parts if is_counterfactual else _proof_parts)(account, scene.units)
     show_result(Result(account, [*parts]), arguments)
     for line in _find_shortcomings(account):
         print(f'linkage replay: {line}', file=sys.stderr)

@@ -78,8 +78,8 @@ def _rows_json(table: Table) -> Iterator[dict[str, Any]]:
         for column, value in zip(table.typed_columns, row, strict=True):
             *objects, name = column.key.split('.')
             place = account
-            for each in objects:
-                place = place.setdefault(each, {})
+            for key in objects:
+                place = place.setdefault(key, {})
             place[name] = value.value if isinstance(value, Quantity) else value
         yield account
 

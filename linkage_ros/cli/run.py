@@ -86,7 +86,7 @@ class Display:
         if self._with_page:
             self._page = PageOfRun(node.get_fully_qualified_name(), self._say_page)
         elif node.scene is None or all(
-            isinstance(each.linkage, Linkage) for each in node.scene.linkages
+            isinstance(linkage.linkage, Linkage) for linkage in node.scene.linkages
         ):
             self._say_page(f'{view_command()}   (in a second terminal)')
 
@@ -149,7 +149,7 @@ def _current_state(
         if reading is not None:
             rates = reading.rates or [None] * len(reading.joints)
             values += zip(scene_linkage.joint_names, reading.joints, rates, strict=True)
-    return age, [_shown_joint(*each, turning[each[0]], units) for each in values[:_MOST_SHOWN]]
+    return age, [_shown_joint(*joint, turning[joint[0]], units) for joint in values[:_MOST_SHOWN]]
 
 
 def _shown_joint(

@@ -133,15 +133,20 @@ def _list_stages(linkage: LinkagePipeline) -> Iterator[tuple[str, str, Any, tupl
     """Yield the stages of a tick in order: name, place, parameters, the effects that need it."""
     name, parameters = linkage.scene_linkage.drive
     yield name, 'drive', parameters, ()
-    given = linkage.scene_linkage.effects
+    effects = linkage.scene_linkage.effects
     for name, effect in linkage.wanted.effects.items():
-        yield name, effect.place, effect, () if name in given else effects_requiring(name, given)
+        yield (
+            name,
+            effect.place,
+            effect,
+            () if name in effects else effects_requiring(name, effects),
+        )
 
 
 def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
     units, linkage = line.scene_linkage.content.units, line.scene_linkage.linkage
     slides = {name: joint.unit == 'm' for name, joint in linkage.joints.items()}
-    slides |= {given.joint: given.unit == 'm' for given in linkage.inputs}
+    slides |= {driven.joint: driven.unit == 'm' for driven in linkage.inputs}
     for index, (name, where, parameters, needed_by) in enumerate(_list_stages(line)):
         yield (
             *(str(index), name, where, first_docstring_line(type(parameters))),
@@ -181,11 +186,11 @@ def _parameters_text(parameters: Any, units: Units, slides: Mapping[str, bool]) 
 
     def value_text(value: Any, unit: str, units: Units) -> str:
         if isinstance(value, tuple | list):
-            return f'[{", ".join(value_text(one, unit, units) for one in value)}]'
+            return f'[{", ".join(value_text(item, unit, units) for item in value)}]'
         if isinstance(value, dict):
             texts = (
-                f'{key}: {value_text(one, unit, replace(units, slides=slides.get(key)))}'
-                for key, one in value.items()
+                f'{key}: {value_text(item, unit, replace(units, slides=slides.get(key)))}'
+                for key, item in value.items()
             )
             return f'{{{", ".join(texts)}}}'
         if hasattr(value, '__dataclass_fields__'):
@@ -245,7 +250,7 @@ def _as_json(value: Any) -> Any:
             entry.name: _as_json(getattr(value, entry.name)) for entry, _ in declared_fields(value)
         }
     if isinstance(value, dict):
-        return {key: _as_json(one) for key, one in value.items()}
+        return {key: _as_json(item) for key, item in value.items()}
     if isinstance(value, tuple | list):
         return list(map(_as_json, value))
     if isinstance(value, float):
@@ -282,16 +287,18 @@ def table_of(what: str, name: str) -> Table:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    one = parser.add_mutually_exclusive_group(required=True)
-    one.add_argument('file', nargs='?', metavar='SCENE', help=SCENE_HELP)
-    one.add_argument(
+    choice = parser.add_mutually_exclusive_group(required=True)
+    choice.add_argument('file', nargs='?', metavar='SCENE', help=SCENE_HELP)
+    choice.add_argument(
         '--list',
         nargs='*',
         metavar='NAME',
         help='drives, effects and faults: their parameters, units, defaults and bounds; '
         'all of them, or those named',
     )
-    one.add_argument('--schema', choices=SCHEMAS, help='the JSON Schema of scene or linkage files')
+    choice.add_argument(
+        '--schema', choices=SCHEMAS, help='the JSON Schema of scene or linkage files'
+    )
     add_result(parser)
     add_set(parser)
 
@@ -325,15 +332,15 @@ def _items_to_list(names: list[str]) -> Iterator[tuple[str, str]]:
     if not names:
         yield from known
     for name in names:
-        found = [entry for entry in known if entry[1] == name]
+        entries = [entry for entry in known if entry[1] == name]
         if '.' in name:
             # A user-defined effect, which no list has.
-            found = [('effect', name)]
-        if not found:
+            entries = [('effect', name)]
+        if not entries:
             words = [word for _, word in known]
             raise LinkageError(
                 f'--list {name}',
                 'there is no such drive, effect or fault',
                 did_you_mean(name, words, f'known: {list_names(words)}'),
             )
-        yield from found
+        yield from entries

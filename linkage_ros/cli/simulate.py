@@ -131,11 +131,11 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     sweeps = [sweep_of(text) for text in arguments.sweep]
     if arguments.seeds > 1 or sweeps:
         return _run_study(arguments, sweeps, stop)
-    for given, option in (
+    for is_set, option in (
         (arguments.workers, '--workers'),
         (arguments.dask, '--dask'),
     ):
-        if given:
+        if is_set:
             raise LinkageError(option, 'is for a study', 'add --seeds or --sweep')
     output: Path = arguments.output
     if output.suffix:
@@ -164,11 +164,11 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
                 'name a folder by -o, and linkage info says why',
             )
         try:
-            found = export_bag(bag, output, None, stop)
+            survey = export_bag(bag, output, None, stop)
         except StoppedError:
             print('linkage simulate: stopped; nothing was written', file=sys.stderr)
             return 1
-    print(f'{output}: {found.rows} rows, {4 + len(found.keys)} columns')
+    print(f'{output}: {survey.rows} rows, {4 + len(survey.keys)} columns')
     return 0
 
 
@@ -220,21 +220,21 @@ def _run_study(
     instants = instants_of(len(runs), len(scene.joint_names), ticks)
     study = Study(scene.name, scene.files, scene.folder, arguments.seconds, instants)
     with closing(FinishedRuns(output, study, runs)) as finished:
-        found = finished.outcomes
-        if found:
-            _print_note(f'continues after {len(found)} of {len(runs)} runs, of {finished.file}')
-        waiting = [part for part in enumerate(runs) if part[0] not in found]
+        outcomes = finished.outcomes
+        if outcomes:
+            _print_note(f'continues after {len(outcomes)} of {len(runs)} runs, of {finished.file}')
+        waiting = [part for part in enumerate(runs) if part[0] not in outcomes]
         workers = max(1, min(arguments.workers or cpu_count() or 1, len(waiting)))
         try:
             with show_progress('runs') as advance:
                 for number, outcome in run_outcomes(study, waiting, workers, arguments.dask):
                     finished.add_run(number, outcome)
-                    advance(len(found), len(runs))
+                    advance(len(outcomes), len(runs))
                     if stop.is_set():
                         raise StoppedError
         except StoppedError:
-            kept = f'{len(found)} of {len(runs)} runs are kept in {finished.file}'
-            _print_note(f'stopped; {kept}; the same command continues' if found else 'stopped')
+            kept = f'{len(outcomes)} of {len(runs)} runs are kept in {finished.file}'
+            _print_note(f'stopped; {kept}; the same command continues' if outcomes else 'stopped')
             return 1
         return _write_results(arguments, scene, runs, finished)
 
@@ -246,26 +246,26 @@ def _write_results(
     finished: FinishedRuns,
 ) -> int:
     """Write the results of a study; return 1 if no run succeeded."""
-    output, found = arguments.output, finished.outcomes
-    failed = [(runs[number], found[number].failure) for number in sorted(found)
-              if found[number].failure]  # fmt: skip
+    output, outcomes = arguments.output, finished.outcomes
+    failed = [(runs[number], outcomes[number].failure) for number in sorted(outcomes)
+              if outcomes[number].failure]  # fmt: skip
     for alike in _group_by_reason(failed)[:_MOST_NAMED]:
-        given, failure = alike[0]
+        settings, failure = alike[0]
         count = len(alike) - 1
         others = f'; likewise {count} other run{"s" * (count > 1)}' if count else ''
-        _print_note(f'{_settings_text(given)}: {failure}{others}')
+        _print_note(f'{_settings_text(settings)}: {failure}{others}')
     if failed:
         _print_note(f'{len(failed)} of {len(runs)} runs failed')
     if len(failed) == len(runs):
         finished.remove_file()
         return 1
     if output.suffix in TABLE_KINDS:
-        heads, rows = _runs_table(scene, runs, found)
+        heads, rows = _runs_table(scene, runs, outcomes)
         with table_file(output, heads, _WHOLE) as write:
             write(rows)
         print(f'{output}: {len(rows)} runs, {len(heads)} columns')
     else:
-        _draw_runs(scene, arguments.seconds, found, output)
+        _draw_runs(scene, arguments.seconds, outcomes, output)
         print(output)
     finished.remove_file()
     return 0
@@ -274,8 +274,8 @@ def _write_results(
 def _group_by_reason(failed: Sequence[_Failure]) -> list[list[_Failure]]:
     """Return the failed runs by their reason, whatever the numbers in it."""
     alike: dict[str, list[_Failure]] = {}
-    for one in failed:
-        alike.setdefault(_NUMBER.sub('', one[1]), []).append(one)
+    for failure in failed:
+        alike.setdefault(_NUMBER.sub('', failure[1]), []).append(failure)
     return [*alike.values()]
 
 
@@ -300,11 +300,13 @@ def _revolute_joints(scene: Scene) -> dict[str, bool]:
 
 
 def _runs_table(
-    scene: Scene, runs: Sequence[Settings], found: Mapping[int, Outcome]
+    scene: Scene, runs: Sequence[Settings], outcomes: Mapping[int, Outcome]
 ) -> tuple[list[str], list[list[float | int | None]]]:
     """Return headings and rows of the table of runs; a run that failed has no numbers."""
     keys = [key for key, _ in runs[0]]
-    columns = list(dict.fromkeys(key for one in found.values() for key in one.statistics))
+    columns = list(
+        dict.fromkeys(key for outcome in outcomes.values() for key in outcome.statistics)
+    )
     turning = _revolute_joints(scene)
     units = [shown_unit(scene.units, unit_in_si(_key_of(column), turning)) for column in columns]
     heads = ['run', *keys, 'ticks', 'messages']
@@ -313,11 +315,11 @@ def _runs_table(
     nothing = Statistics(nan, nan, nan, nan)
     rows: list[list[float | int | None]] = []
     for index, settings in enumerate(runs):
-        outcome = found[index]
+        outcome = outcomes[index]
         row: list[float | int | None] = [index + 1, *(value for _, value in settings)]
         row += [outcome.ticks, outcome.messages]
-        for column, (_, one) in zip(columns, units, strict=True):
-            row += [value / one for value in outcome.statistics.get(column, nothing)]
+        for column, (_, factor) in zip(columns, units, strict=True):
+            row += [value / factor for value in outcome.statistics.get(column, nothing)]
         rows.append(row)
     return heads, rows
 
@@ -328,12 +330,14 @@ def _key_of(column: str) -> Key:
     return joint, {'': POSITION, 'rate': RATE, 'effort': EFFORT}[quantity]
 
 
-def _draw_runs(scene: Scene, seconds: float, found: Mapping[int, Outcome], picture: Path) -> None:
+def _draw_runs(
+    scene: Scene, seconds: float, outcomes: Mapping[int, Outcome], picture: Path
+) -> None:
     """Draw the spread of the runs that succeeded."""
     import numpy as np  # local import: only for a picture
 
     spread = find_tool('spread')
-    good = [found[number] for number in sorted(found) if not found[number].failure]
+    good = [outcomes[number] for number in sorted(outcomes) if not outcomes[number].failure]
     turning = _revolute_joints(scene)
     joints = [
         spread.JointSpread(

@@ -165,17 +165,17 @@ def _forward_table(
     question = _read_question(closure, arguments)
     rows = []
     with show_progress('states solved') as advance:
-        for index, given in enumerate(question.inputs):
+        for index, inputs in enumerate(question.inputs):
             if index % _TOLD == 0:
                 advance(index, len(question.inputs))
-            rows.append(_state_row(closure, question, given))
+            rows.append(_state_row(closure, question, inputs))
     _show_reach(closure, question.inputs[: len(arguments.at)], arguments.angles)
     return list(_output_columns(closure, question)), rows
 
 
 def _is_swept(arguments: argparse.Namespace) -> bool:
     ends = arguments.over, arguments.first, arguments.last
-    return arguments.sweep or any(given is not None for given in ends)
+    return arguments.sweep or any(end is not None for end in ends)
 
 
 def _swept_input(closure: Closure, named: str | None) -> int:
@@ -196,8 +196,8 @@ def _swept_input(closure: Closure, named: str | None) -> int:
 def _check_alone(arguments: argparse.Namespace) -> None:
     """Refuse other options that say which states to solve, besides ``--joint``."""
     swept = _is_swept(arguments)
-    for option, given in (('--at', arguments.at), ('--sweep', swept)):
-        if given:
+    for option, is_set in (('--at', arguments.at), ('--sweep', swept)):
+        if is_set:
             where = f'--joint {arguments.joint[0][0]}'
             raise LinkageError(where, f'{option} is given too', 'leave one of them out')
 
@@ -218,7 +218,9 @@ def _exchanged_table(
     }
     searched = search_inputs(closure, values)
     within = [
-        each for each in searched.inputs if closure.position(*each).status is not Status.LIMITED
+        inputs
+        for inputs in searched.inputs
+        if closure.position(*inputs).status is not Status.LIMITED
     ]
     option = ' '.join(f'--joint {name}={typed:g}' for name, typed in arguments.joint)
     if searched.inputs and not within:
@@ -234,10 +236,10 @@ def _exchanged_table(
     columns, rows = [], []
     for inputs in within:
         inverse = closure.driven_by(*names, near=inputs)
-        given = turn_to_pose(inverse, [*values.values()])
-        question = _read_question(inverse, arguments, [given])
+        found_inputs = turn_to_pose(inverse, [*values.values()])
+        question = _read_question(inverse, arguments, [found_inputs])
         columns = list(_output_columns(inverse, question))
-        rows += [_state_row(inverse, question, given)]
+        rows += [_state_row(inverse, question, found_inputs)]
     _note(f'{len(rows)} found by a search from {searched.starts} states; there may be others')
     return columns, rows
 
@@ -266,7 +268,7 @@ def _inverse_table(
         for number, _ in cranks:
             inverse = closure.driven_by(joint, branch=number)
             question = _read_question(inverse, arguments, [(value,)])
-            (row,) = (_state_row(inverse, question, given) for given in question.inputs)
+            (row,) = (_state_row(inverse, question, inputs) for inputs in question.inputs)
             columns = list(_output_columns(inverse, question))
             crank = inverse.position(value).joints[0]
             # The branch and its crank come first; the gap is 0.
@@ -309,18 +311,18 @@ def _show_reach(
     closure: Closure, typed: Sequence[tuple[float, ...]], angles: DisplayUnits
 ) -> None:
     """Say once where the linkage closes, if it does not at an input that was typed."""
-    for given in typed:
-        reach = '' if closure.position(*given).joints else _reach_text(closure, given, angles)
+    for inputs in typed:
+        reach = '' if closure.position(*inputs).joints else _reach_text(closure, inputs, angles)
         if reach:
             _note(reach)
             return
 
 
-def _reach_text(closure: Closure, given: tuple[float, ...], angles: DisplayUnits) -> str:
+def _reach_text(closure: Closure, inputs: tuple[float, ...], angles: DisplayUnits) -> str:
     """Return where a linkage closes by its first input; '' if nowhere."""
     ends = [
-        [angles.value_text(end, one.turning) for end in (one.lowest, one.highest)]
-        for one in InputSweep(closure, given).ranges
+        [angles.value_text(end, interval.turning) for end in (interval.lowest, interval.highest)]
+        for interval in InputSweep(closure, inputs).ranges
     ]
     text = ' and '.join(f'from {low} to {high}' for low, high in ends)
     return f'{closure.linkage.inputs[0].joint} closes {text}' if ends else ''
@@ -409,8 +411,8 @@ def _sweep_inputs(
 
 def _output_columns(closure: Closure, question: Question) -> Iterator[Column]:
     linkage = closure.linkage
-    for given in linkage.inputs:
-        yield _state_column(given.joint, given.unit)
+    for driven in linkage.inputs:
+        yield _state_column(driven.joint, driven.unit)
     yield Column('status', 'status')
     yield Column('>gap', 'gap', 'm', '.3g')
     for order in _derivative_orders(question):
@@ -423,9 +425,9 @@ def _output_columns(closure: Closure, question: Question) -> Iterator[Column]:
 
     if question.jacobian:
         for name, joint in linkage.joints.items():
-            for given in linkage.inputs:
-                unit = '' if joint.unit == given.unit else f'{joint.unit}/{given.unit}'
-                slope = f'{name} by {given.joint}'
+            for driven in linkage.inputs:
+                unit = '' if joint.unit == driven.unit else f'{joint.unit}/{driven.unit}'
+                slope = f'{name} by {driven.joint}'
                 yield Column(f'>{slope}', slope, unit, _slope_text)
 
 
@@ -441,13 +443,13 @@ def _derivative_orders(question: Question) -> range:
     return range(1 + (question.rates is not None) + (question.accelerations is not None))
 
 
-def _state_row(closure: Closure, question: Question, given: tuple[float, ...]) -> list[Any]:
+def _state_row(closure: Closure, question: Question, inputs: tuple[float, ...]) -> list[Any]:
     """Return the cells of a state; empty cells where there is no value."""
-    row: list[Any] = [*given]
-    position = closure.position(*given)
+    row: list[Any] = [*inputs]
+    position = closure.position(*inputs)
     row += [position.status.value, position.gap]
     count = len(closure.turning) + len(closure.linkage.axes) * len(question.points)
-    slopes = len(closure.turning) * len(given) if question.jacobian else 0
+    slopes = len(closure.turning) * len(inputs) if question.jacobian else 0
     if not position.joints:
         return row + [None] * (count * len(_derivative_orders(question)) + slopes)
     row += [

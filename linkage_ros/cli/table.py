@@ -107,16 +107,20 @@ class Table(NamedTuple):
     @property
     def heads(self) -> list[str]:
         """Return the headings, without units."""
-        return [one.heading for one in self.typed_columns if one.heading is not None]
+        return [column.heading for column in self.typed_columns if column.heading is not None]
 
     @property
     def typed_columns(self) -> list[Column]:
         """Return the columns."""
-        return [Column(one) if isinstance(one, str) else one for one in self.columns]
+        return [Column(column) if isinstance(column, str) else column for column in self.columns]
 
     def as_texts(self, units: DisplayUnits = DEGREES) -> Table:
         """Return the table as text."""
-        shown = [each for each in enumerate(self.typed_columns) if each[1].heading is not None]
+        shown = [
+            numbered
+            for numbered in enumerate(self.typed_columns)
+            if numbered[1].heading is not None
+        ]
         return Table(
             self.title,
             [column.head(units) for _, column in shown],
@@ -135,7 +139,7 @@ def table_of_rows(
     title: str, key: str, columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]
 ) -> Table:
     """Return a table of rows as JSON holds them."""
-    return Table(title, columns, [[row[one.key] for one in columns] for row in rows], key)
+    return Table(title, columns, [[row[column.key] for column in columns] for row in rows], key)
 
 
 def facts_table(title: str, facts: Iterable[tuple[str, str]]) -> Table:
