@@ -104,7 +104,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 # The description of a linkage as JSON holds it: values are in SI units, and their keys say so, or
-# the 'unit' beside them.
+# the 'unit' next to them.
 
 
 def _describe_linkage(
@@ -119,19 +119,19 @@ def _describe_linkage(
         parts, assemblies = [_four_bars_table], _other_assemblies
     else:
         groups, account = closure.groups, _space_json(closure)
-    account['groups'] = [one._asdict() for one in groups]
-    rows = [(number, *one) for number, one in enumerate(groups, 1)]
+    account['groups'] = [group._asdict() for group in groups]
+    rows = [(number, *group) for number, group in enumerate(groups, 1)]
     tables = [Table('Solved in this order', _ORDER, rows, 'groups')]
     # Most of the time goes by here.
     parts += [_examine_reach, _map_limits, _examine_states, _examine_joints, assemblies]
     parts += [_transmission_table, _conditioning_table]
     for index, part in enumerate(parts):
         advance(index, len(parts))
-        found = part(closure, sweep)
-        if isinstance(found, Table):
-            tables.append(found)
-            found = tables_json([found])
-        account |= found
+        content = part(closure, sweep)
+        if isinstance(content, Table):
+            tables.append(content)
+            content = tables_json([content])
+        account |= content
     return account, tables
 
 
@@ -150,9 +150,9 @@ def _structure_json(closure: PlanarClosure) -> dict[str, Any]:
         'loops': len(structure.joints) - moving,
         'degrees_of_freedom': structure.mobility,
         'inputs': [
-            {'joint': given.joint, 'unit': given.unit}
-            | {key: getattr(given, key) or None for key in ('slider', 'parent', 'child')}
-            for given in linkage.inputs
+            {'joint': driven.joint, 'unit': driven.unit}
+            | {key: getattr(driven, key) or None for key in ('slider', 'parent', 'child')}
+            for driven in linkage.inputs
         ],
         'limits': _limits_json(linkage),
         'unwrapped': _counts_turns(closure),
@@ -241,8 +241,13 @@ def _examine_reach(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]
 def _map_limits(closure: Closure, _sweep: InputSweep | None) -> dict[str, Any]:
     """Return what is reached within limits of other joints."""
     joints = closure.linkage.named_joints
-    found = find_reached_values(closure)
-    return {'reached': [one._asdict() | {'unit': joints[one.joint].unit} for one in found]}
+    reached = find_reached_values(closure)
+    return {
+        'reached': [
+            joint_range._asdict() | {'unit': joints[joint_range.joint].unit}
+            for joint_range in reached
+        ]
+    }
 
 
 def _is_reached(sweep: InputSweep, value: float) -> bool:
@@ -293,11 +298,11 @@ def _other_assemblies(closure: PlanarClosure, _way: InputSweep | None) -> dict[s
             {
                 'points_m': {
                     name: [place.real + 0.0, place.imag + 0.0]
-                    for name, place in one.points.items()
+                    for name, place in assembly.points.items()
                 },
-                'turns': one.turns,
+                'turns': assembly.turns,
             }
-            for one in other_assemblies(closure, index)
+            for assembly in other_assemblies(closure, index)
         ]
         head = {'group': index + 1, 'starts': STARTS, 'inputs': list(pose.inputs)}
         groups.append(head | {'assemblies': assemblies})
@@ -317,12 +322,12 @@ def _describe_group(
     """Return a group in words; sides as `sides_at`."""
     group: Group = closure.structure.groups[number]
     if isinstance(group, Driven):
-        given = closure.linkage.driven_joints[group.index]
+        driven = closure.linkage.driven_joints[group.index]
         place = f'{"pin" if group.joint.kind == "R" else "slider"} {group.joint.name}'
-        ratio = closure.linkage.ratios.get(given.joint)
+        ratio = closure.linkage.ratios.get(driven.joint)
         follows = f' follows {ratio.text}' if ratio else ''
         kind = 'ratio' if ratio else 'input'
-        method = f'{given.joint}{follows}, {place} on {group.joint.to}'
+        method = f'{driven.joint}{follows}, {place} on {group.joint.to}'
         return GroupDescription(kind, [group.joint.link], method, '')
     steps = [
         step
@@ -363,7 +368,7 @@ def _space_json(closure: SpaceClosure) -> dict[str, Any]:
     joined = {frozenset((joint.parent, joint.child)) for joint in linkage.pair_joints.values()}
     for point in linkage.points:
         first, *others = [link for link, points in linkage.links.items() if point in points]
-        joined |= {frozenset((first, other)) for other in others}
+        joined |= {frozenset((first, link)) for link in others}
     return {
         'moving_links': moving,
         'loops': len(joined) + len(linkage.struts) - moving,
@@ -376,7 +381,7 @@ def _space_json(closure: SpaceClosure) -> dict[str, Any]:
         'spinning_rods': list(closure.idle),
         'held_joints': list(closure.held),
         'unwrapped': False,
-        'inputs': [{'joint': given.joint, 'unit': given.unit} for given in linkage.inputs],
+        'inputs': [{'joint': driven.joint, 'unit': driven.unit} for driven in linkage.inputs],
         'limits': _limits_json(linkage),
         **_corrections_json(linkage),
     }
@@ -421,7 +426,7 @@ def _linkage_tables(
     """Yield the tables that describe a linkage."""
     yield facts_table(account['file'], linkage_facts(account, units))
     yield tables[0]
-    input_units = [given['unit'] for given in account['inputs']]
+    input_units = [driven['unit'] for driven in account['inputs']]
     for group in account['other_assemblies'] if 'pins' in account else ():
         yield _assemblies_table(group, input_units, units)
     yield from (table for table in tables[1:] if table.rows or table.key == 'branches')
@@ -446,24 +451,24 @@ def _transmission_table(closure: Closure, sweep: InputSweep | None) -> Table:
         return '' if value is None else units.format_angle(value, 2)
 
     ends = [Column(f'>{end}', f'{end}.angle_rad', 'rad', angle) for end in ('least', 'greatest')]
-    found = {} if sweep is None else transmission_angles(sweep)
+    curves = {} if sweep is None else transmission_angles(sweep)
     title = 'Transmission angles over the range, acute'
-    return _extremes_table(title, 'transmission_angles', closure, found, ends)
+    return _extremes_table(title, 'transmission_angles', closure, curves, ends)
 
 
 def _conditioning_table(closure: Closure, sweep: InputSweep | None) -> Table:
     least = Column('>least', 'least.conditioning', form='.4f')
     ends = [least, Column(None, 'greatest.conditioning')]
-    found = {} if sweep is None else conditioning_curves(sweep)
+    curves = {} if sweep is None else conditioning_curves(sweep)
     title = 'Conditioning over the range, of iterated links'
-    return _extremes_table(title, 'conditioning', closure, found, ends)
+    return _extremes_table(title, 'conditioning', closure, curves, ends)
 
 
 def _extremes_table(
     title: str,
     key: str,
     closure: Closure,
-    found: Mapping[int, SweptCurve],
+    curves: Mapping[int, SweptCurve],
     ends: Sequence[Column],
 ) -> Table:
     """Return the extreme values by group, and the inputs where they occur; none if constant."""
@@ -482,7 +487,7 @@ def _extremes_table(
             *(finite_or_none(curve.lowest.value), list(curve.lowest.at)),
             *(finite_or_none(curve.highest.value), list(curve.highest.at)),
         )
-        for number, curve in found.items()
+        for number, curve in curves.items()
     ]
     return Table(title, columns, rows, key)
 
@@ -494,10 +499,10 @@ def _links_of(closure: Closure, number: int) -> list[str]:
 
 
 def _branches_table(closure: Closure) -> Table:
-    given = closure.linkage.inputs[0]
+    driven = closure.linkage.inputs[0]
 
     def input_text(value: float, units: DisplayUnits) -> str:
-        return units.value_text(value, given.unit == 'rad')
+        return units.value_text(value, driven.unit == 'rad')
 
     def limits_text(by: Sequence[str | None], _units: DisplayUnits) -> str:
         return ', '.join(sorted({name for name in by if name}))
@@ -505,8 +510,8 @@ def _branches_table(closure: Closure) -> Table:
     columns = (
         Column('joint', 'joint'),
         Column('>branch', 'branch'),
-        Column(f'>{given.joint} from', 'input_low', given.unit, input_text),
-        Column('>to', 'input_high', given.unit, input_text),
+        Column(f'>{driven.joint} from', 'input_low', driven.unit, input_text),
+        Column('>to', 'input_high', driven.unit, input_text),
         Column(None, UNIT),
         Column('>joint from', 'low'),
         Column('>to', 'high'),
@@ -528,10 +533,10 @@ def _assemblies_table(
     )
     rows = [
         (
-            f'{{inputs: [{inputs}], points: {{{_points_text(one["points_m"], units)}}}}}',
-            _turns_text(one['turns']),
+            f'{{inputs: [{inputs}], points: {{{_points_text(assembly["points_m"], units)}}}}}',
+            _turns_text(assembly['turns']),
         )
-        for one in group['assemblies']
+        for assembly in group['assemblies']
     ]
     return Table(
         f'Other assemblies of group {group["group"]} at the inputs of the pose: '
@@ -546,8 +551,8 @@ def _other_poses_table(closure: SpaceClosure, _sweep: InputSweep | None) -> Tabl
     """Return the other assemblies of what closes only together, at the inputs of the pose."""
     rows = [
         (number + 1, joints)
-        for number, found in closure.other_assemblies(_STARTS).items()
-        for joints in found
+        for number, assemblies in closure.other_assemblies(_STARTS).items()
+        for joints in assemblies
     ]
 
     def joints_text(joints: Mapping[str, float], units: DisplayUnits) -> str:
