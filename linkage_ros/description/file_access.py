@@ -114,7 +114,7 @@ def _is_of_a_bag(file: Path) -> bool:
 
 def atomic_write(file: str | Path, data: bytes) -> None:
     """
-    Write or replace a file: write it beside the target, then rename it.
+    Write or replace a file: write it next to the target, then rename it.
 
     A symbolic link is followed, and an old file's permissions are kept. A LinkageError says that
     the file cannot be written.
@@ -141,7 +141,7 @@ def write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
     """
     Write a folder with the files of these paths in it, or nothing.
 
-    They are written beside the folder first. In a folder that exists each then replaces the old
+    They are written next to the folder first. In a folder that exists each then replaces the old
     one, and other files stay. A LinkageError says that the folder cannot be written.
     """
     temporary = _temporary_name(folder)

@@ -37,7 +37,7 @@ YAML = ('.yaml', '.yml')
 """Suffixes of a file of closings."""
 
 CLOSINGS = 'closed_loop'
-"""Key of a YAML file that closes the loops of a URDF beside it."""
+"""Key of a YAML file that closes the loops of a URDF next to it."""
 
 
 _BAG = FileKind('a bag', 'linkage info, plot and report read bags')

@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Kinds of values in scene and linkage files, beside those of parameters."""
+"""Kinds of values in scene and linkage files, other than those of parameters."""
 
 from __future__ import annotations
 
@@ -96,9 +96,10 @@ class OneOrMore(Kind):
     of: Keys
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> list[Any]:
-        found = content.sections(key, example=lambda _: self.example(parts))
+        sections = content.sections(key, example=lambda _: self.example(parts))
         readers = {
-            i: partial(read_parameters, one, self.of, parts, folder) for i, one in enumerate(found)
+            i: partial(read_parameters, section, self.of, parts, folder)
+            for i, section in enumerate(sections)
         }
         return [*read_each(readers).values()]
 
@@ -109,13 +110,13 @@ class OneOrMore(Kind):
         return one_or_more(self.meaning, parameters_schema(self.of))
 
 
-def one_or_more(meaning: str, one: Schema) -> Schema:
+def one_or_more(meaning: str, schema: Schema) -> Schema:
     """Return the JSON Schema of one mapping, or a list of them."""
     return {
         'description': meaning,
         'if': {'type': 'array'},
-        'then': {'minItems': 1, 'items': one},
-        'else': one,
+        'then': {'minItems': 1, 'items': schema},
+        'else': schema,
     }
 
 
@@ -198,14 +199,14 @@ class Together(Rule):
     keys: tuple[str, str]
 
     def check(self, content: Section) -> None:
-        for key, other in (self.keys, self.keys[::-1]):
-            if key in content and other not in content:
-                remedy = f'write {other} too, or leave it out'
-                raise content.error(key, f'is without {other}', remedy)
+        for key, second in (self.keys, self.keys[::-1]):
+            if key in content and second not in content:
+                remedy = f'write {second} too, or leave it out'
+                raise content.error(key, f'is without {second}', remedy)
 
     def json_schema(self) -> Schema:
-        one, other = self.keys
-        return {'dependentRequired': {one: [other], other: [one]}}
+        first, second = self.keys
+        return {'dependentRequired': {first: [second], second: [first]}}
 
 
 @dataclass(frozen=True, slots=True)

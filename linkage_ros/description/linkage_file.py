@@ -75,8 +75,8 @@ def load(linkage: str | PathLike[str], robot: Mapping[str, Any] | None = None) -
         ``'jansen_leg'``; `linkage_names` lists them. Or a URDF with loops, which ends in
         ``.urdf``.
     robot
-        What a scene says of a robot beside its URDF: ``{'input': ['m1', 'm2']}``, and ``at`` and
-        ``close``.
+        What a scene says of a robot that its URDF does not: ``{'input': ['m1', 'm2']}``, and
+        ``at`` and ``close``.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def linkage_content(file: Path, robot: Mapping[str, Any] | None = None) -> Secti
 
 
 def urdf_content(file: Path, robot: Mapping[str, Any]) -> Section:
-    """Return the content of a robot, with what is said beside its URDF as in a scene."""
+    """Return the content of a robot, with what its URDF does not say, as in a scene."""
     return robot_content(Section(str(file), '', {'urdf': str(file), **robot}), file)
 
 
@@ -261,16 +261,16 @@ def _parse_linkage(
         published = {driven.joint: _published_joint(driven) for driven in inputs} | joints
     traced = of_linkage['traced'] or ()
     masses = {
-        link: _mass_of(content, link, given, points[link])
-        for link, given in (of_linkage['masses'] or {}).items()
+        link: _mass_of(content, link, mass, points[link])
+        for link, mass in (of_linkage['masses'] or {}).items()
     }
     pose = pose or of_linkage['pose']
     units = {name: joint.unit for name, joint in joints.items()}
     units |= {driven.joint: driven.unit for driven in inputs}
     parts['slide'] = [name for name, unit in units.items() if unit == 'm']
     ratios = {
-        name: ratio_in_si(one, name, units, content.units)
-        for name, one in (read('ratios') or {}).items()
+        name: ratio_in_si(ratio, name, units, content.units)
+        for name, ratio in (read('ratios') or {}).items()
     }
     x, y = of_linkage['axes']
     return Linkage(
@@ -279,12 +279,12 @@ def _parse_linkage(
 
 
 def _mass_of(
-    content: Section, link: str, given: dict[str, Any], points: Mapping[str, Point]
+    content: Section, link: str, values: dict[str, Any], points: Mapping[str, Point]
 ) -> Mass:
     """Return the mass of a link, which may be written as that of a rod."""
-    mass = given['mass']
-    if not is_rod(content, link, given, [*points]):
-        return Mass(mass, given.get('center', (0.0, 0.0)), given.get('inertia', 0.0))
+    mass = values['mass']
+    if not is_rod(content, link, values, [*points]):
+        return Mass(mass, values.get('center', (0.0, 0.0)), values.get('inertia', 0.0))
     (x, y), (to_x, to_y) = points.values()
     square = (to_x - x) * (to_x - x) + (to_y - y) * (to_y - y)
     return Mass(mass, (0.5 * (x + to_x), 0.5 * (y + to_y)), mass / 12.0 * square)
@@ -346,19 +346,19 @@ def find_closures(content: Section, name: str) -> dict[str, PlanarClosure]:
     if len(free) > _MOST_SIDES:
         reason = f'{len(free)} sides are to be chosen'
         raise content.error('assembly', reason, f'leave out only {_MOST_SIDES} of them')
-    found = {}
+    closures = {}
     errors = []
     written = without_drawn_pose(written, structure)
     for chosen in product(*(sides[name] for name in free)):
         assembly = dict(written.assembly) | dict(zip(free, chosen, strict=True))
-        one = replace(written, assembly=assembly)  # type: ignore[arg-type]  # sides, as above
+        choice = replace(written, assembly=assembly)  # type: ignore[arg-type]  # sides, as above
         # A shorthand has one side, without the name of its pin or slider.
         text = ', '.join(chosen if shorthand else (f'{k}: {v}' for k, v in assembly.items()))
         text = f'assembly: {text if shorthand else f"{{{text}}}"}'
         try:
-            found[text] = checked_closure(content, one, name, shorthand)
+            closures[text] = checked_closure(content, choice, name, shorthand)
         except FileError as error:
             errors.append(error)
-    if not found:
+    if not closures:
         raise errors[0]
-    return found
+    return closures

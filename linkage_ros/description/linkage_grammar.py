@@ -150,9 +150,9 @@ LIMITS = {
 }
 
 
-def is_rod(content: Section, link: str, given: _Values, points: Sequence[object]) -> bool:
+def is_rod(content: Section, link: str, values: _Values, points: Sequence[object]) -> bool:
     """Return whether a mass is that of a rod between two points; refuse one of another link."""
-    if 'center' in given or not given['mass']:
+    if 'center' in values or not values['mass']:
         return False
     if len(points) != 2:
         count = f'{len(points)} point{"s" * (len(points) != 1)}'
@@ -406,11 +406,13 @@ def _written_limits(**values: Any) -> _Values:
 
 def _common_keys(side: Any, **joints: bool) -> _Values:
     """Return the keys of every shorthand, with the joints that it publishes, sliding or not."""
-    each = {name: _joint_limits('Limits of the joint.', slides) for name, slides in joints.items()}
+    limits = {
+        name: _joint_limits('Limits of the joint.', slides) for name, slides in joints.items()
+    }
     limited = Keys(
         'Limits of the published joints, by name.',
         dict,
-        {name: optional_keys(of) for name, of in each.items()},
+        {name: optional_keys(of) for name, of in limits.items()},
     )
     return {
         'assembly': side,
@@ -466,8 +468,8 @@ def ratio_in_si(ratio: Ratio, name: str, unit_of: Mapping[str, str | None], unit
     """
 
     def factor_in_si(factor: float, of: str) -> float:
-        found = units.to_si(factor, 'm' if unit_of.get(name) == 'm' else '')
-        return found / units.to_si(1.0, 'm') if unit_of.get(of) == 'm' else found
+        in_si = units.to_si(factor, 'm' if unit_of.get(name) == 'm' else '')
+        return in_si / units.to_si(1.0, 'm') if unit_of.get(of) == 'm' else in_si
 
     also = {of: factor_in_si(factor, of) for of, factor in ratio.also.items()}
     return replace(ratio, ratio=factor_in_si(ratio.ratio, ratio.of), also=also)

@@ -119,7 +119,7 @@ def number_text(value: float) -> str:
 
 def content_of(linkage: Linkage) -> dict[str, Content]:
     """Return the content of the file in its order, without optional entries that are empty."""
-    inputs: list[Content] = [_input_content(given) for given in linkage.inputs]
+    inputs: list[Content] = [_input_content(driven) for driven in linkage.inputs]
     axes = ''.join(linkage.axes)
     content: dict[str, Content] = {
         'axes': '' if axes == 'xy' else axes,
@@ -188,11 +188,11 @@ def _slider_content(slider: Slider) -> dict[str, Content]:
     }
 
 
-def _input_content(given: Input) -> dict[str, Content]:
-    limits = _limits_content(given.limits)
-    if given.slider:
-        return {'joint': given.joint, 'slider': given.slider, **limits}
-    return {'joint': given.joint, 'parent': given.parent, 'child': given.child, **limits}
+def _input_content(driven: Input) -> dict[str, Content]:
+    limits = _limits_content(driven.limits)
+    if driven.slider:
+        return {'joint': driven.joint, 'slider': driven.slider, **limits}
+    return {'joint': driven.joint, 'parent': driven.parent, 'child': driven.child, **limits}
 
 
 def _joint_content(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
@@ -203,10 +203,10 @@ def _joint_content(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
     return {'parent': joint.parent, 'child': joint.child, **turns, **limits}
 
 
-def _ratio_content(given: Ratio) -> dict[str, Content]:
-    offset: dict[str, Content] = {'offset': given.offset} if given.offset else {}
-    also: dict[str, Content] = {'also': {**given.also}} if given.also else {}
-    return {'of': given.of, 'ratio': given.ratio, **also, **offset}
+def _ratio_content(ratio: Ratio) -> dict[str, Content]:
+    offset: dict[str, Content] = {'offset': ratio.offset} if ratio.offset else {}
+    also: dict[str, Content] = {'also': {**ratio.also}} if ratio.also else {}
+    return {'of': ratio.of, 'ratio': ratio.ratio, **also, **offset}
 
 
 def _limits_content(limits: Limits) -> dict[str, Content]:
@@ -236,7 +236,7 @@ def pose_text(linkage: Linkage, pose: AssemblyPose, units: Units) -> str:
 
     driven = zip(pose.inputs, linkage.inputs, strict=True)
     rounded = AssemblyPose(
-        tuple(in_file_unit(value, given.unit) for value, given in driven),
+        tuple(in_file_unit(value, driven_joint.unit) for value, driven_joint in driven),
         {
             name: (in_file_unit(x, 'm'), in_file_unit(y, 'm'))
             for name, (x, y) in pose.points.items()
@@ -332,7 +332,7 @@ def _find_start(closure: PlanarClosure) -> tuple[float, InputRange]:
     way, pose = InputSweep(closure), closure.linkage.pose
     if pose is None or not starts_at_pose(closure):
         (start,) = usual_inputs(closure)
-        # The usual input may lie beside a range that is as narrow as its rounding.
+        # The usual input may lie next to a range that is as narrow as its rounding.
         interval = way.range_about(start) or way.widest_range
         assert interval is not None, 'reading the file has proved that it closes somewhere'
         return start, interval

@@ -109,7 +109,7 @@ def _limit_notes(linkage: Linkage | SpaceLinkage, units: Units) -> Iterator[Defi
         return
     for name, end in ends.items():
         if end > tau:
-            driven = name in (given.joint for given in linkage.inputs)
+            driven = name in (driven_joint.joint for driven_joint in linkage.inputs)
             key = 'input.limits' if driven else f'joints.{name}.limits'
             yield DefinitionError(
                 key if isinstance(linkage, Linkage) else f'hinges.{name}.limits',
@@ -123,7 +123,9 @@ def _link_lengths(linkage: Linkage | SpaceLinkage) -> dict[str, float]:
     if not isinstance(linkage, Linkage):
         places = linkage.points
         return {
-            link: max(dist(places[one], places[other]) for one, other in combinations(points, 2))
+            link: max(
+                dist(places[first], places[second]) for first, second in combinations(points, 2)
+            )
             for link, points in linkage.links.items()
             if len(points) > 1
         }
@@ -132,7 +134,7 @@ def _link_lengths(linkage: Linkage | SpaceLinkage) -> dict[str, float]:
     for link, points in linkage.links.items():
         joined = [place for name, place in points.items() if name in pins]
         if len(joined) > 1:
-            lengths[link] = max(dist(one, other) for one, other in combinations(joined, 2))
+            lengths[link] = max(dist(first, second) for first, second in combinations(joined, 2))
     return lengths
 
 
@@ -146,17 +148,17 @@ def _lengths_with_hinges(linkage: Linkage | SpaceLinkage) -> dict[str, float]:
     for hinge in linkage.hinges.values():
         for link in (hinge.parent, hinge.child):
             places.setdefault(link, []).append(hinge.at)
-    return {link: extent_of(found) for link, found in places.items()}
+    return {link: extent_of(of_link) for link, of_link in places.items()}
 
 
 def _linkage_notes(scene_linkage: SceneLinkage) -> Iterator[DefinitionError]:
     drive, parameters = scene_linkage.drive
     if scene_linkage.content.units.angle == 'radians' and hasattr(parameters, 'amplitude'):
-        for given in scene_linkage.linkage.inputs:
-            own = given.joint in parameters.inputs
-            amplitude = (parameters.inputs[given.joint] if own else parameters).amplitude
-            if not given.slider and amplitude > tau:
-                key = f'drive.{drive}{f".inputs.{given.joint}" if own else ""}.amplitude'
+        for driven in scene_linkage.linkage.inputs:
+            own = driven.joint in parameters.inputs
+            amplitude = (parameters.inputs[driven.joint] if own else parameters).amplitude
+            if not driven.slider and amplitude > tau:
+                key = f'drive.{drive}{f".inputs.{driven.joint}" if own else ""}.amplitude'
                 yield DefinitionError(
                     key,
                     f'{amplitude:g} rad is more than a turn',

@@ -154,15 +154,15 @@ class Number(Kind):
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> float | int:
         bounds: dict[str, Any] = {'least': self.least, 'most': self.most, 'unit': self.unit}
-        found: float | int
+        number: float | int
         if self.whole:
-            found = content.whole_number(key, **bounds)
+            number = content.whole_number(key, **bounds)
         else:
-            found = content.number(key, above=self.above, **bounds)
-        if 0 < found < self.unless_zero:
+            number = content.number(key, above=self.above, **bounds)
+        if 0 < number < self.unless_zero:
             remedy = f'write {self.unless_zero:.9g} or more, or 0'
-            raise content.error(key, f'{found:g} is too small', remedy)
-        return found
+            raise content.error(key, f'{number:g} is too small', remedy)
+        return number
 
     def json_schema(self) -> Schema:
         kind = 'integer' if self.whole else 'number'
@@ -451,12 +451,12 @@ class Each(Name):
     def table_rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
         """Yield one row, and the rows of the values."""
         yield from Kind.table_rows(self, key, default)
-        one = (
+        entry = (
             'LINK.POINT'
             if self.kind in ('point', 'hole')
             else self.kind.removeprefix('any_').upper()
         )
-        part = f'{key}.{one}'
+        part = f'{key}.{entry}'
         rows = self._value_kind.table_rows(part, '')
         if isinstance(self.of, type):
             next(rows)

@@ -152,7 +152,7 @@ class SceneLinkage:
     @property
     def input_names(self) -> tuple[str, ...]:
         """Return the names of its driven joints, as in messages."""
-        return tuple(self.prefix + given.joint for given in self.linkage.inputs)
+        return tuple(self.prefix + driven.joint for driven in self.linkage.inputs)
 
     @property
     def sampled_joints(self) -> tuple[str, ...]:
@@ -276,7 +276,7 @@ def _joints_of(linkage: JointedLinkage) -> dict[str, tuple[str, ...]]:
     joints = linkage.named_joints
     return {
         'joint': tuple(linkage.joints),
-        'input': tuple(given.joint for given in linkage.inputs),
+        'input': tuple(driven.joint for driven in linkage.inputs),
         'any_joint': tuple(joints),
         'slide': tuple(name for name, joint in joints.items() if isinstance(joint, SlideJoint)),
     }

@@ -63,7 +63,7 @@ _MOST_LINKAGES = 400
 """A hundred linkages at 1 kHz fill a core."""
 
 _SCENE_KEYS = {*SCENE.entries} - {'units', 'angles'}
-"""Keys that tell a scene from a linkage, beside its linkages."""
+"""Keys that tell a scene from a linkage, other than its linkages."""
 
 Open = Callable[[Section], tuple[Section, bytes]]
 """Opens the linkage file that a section names under ``linkage``."""
@@ -97,7 +97,7 @@ def load_scene(
         The scene file; paths in it are relative to its folder. Or a linkage file; or the name of
         a scene or a linkage that comes with the package, such as ``'demo'``.
     settings
-        Keys to set beside the file, as ``drive.sine.amplitude=0.3``; they are part of
+        Keys to set, without editing the file, as ``drive.sine.amplitude=0.3``; they are part of
         `Scene.files`.
     confinement
         What the scene may name, where another process asks for it; None for anything.
@@ -160,7 +160,7 @@ def kind_of(content: Section) -> Literal['scene', 'linkage']:
                     raise content.error(
                         key,
                         'is a key of scenes, and this is a linkage',
-                        f'write it beside linkage: {Path(content.file).name} into another file',
+                        f'write it next to linkage: {Path(content.file).name} into another file',
                     )
             return 'linkage'
         if not any(key in _SCENE_KEYS for key in content):
@@ -278,7 +278,7 @@ def seed_of(name: str) -> int:
 def _build_scene(
     content: Section, data: bytes, source: _SceneSource, settings: Sequence[str] = ()
 ) -> Scene:
-    """Read a scene with settings beside its file."""
+    """Read a scene with settings of its keys."""
     if not settings:
         return _read_scene(content, data, source)
     from linkage_ros.description import scene_settings as given  # local import: few scenes need it
@@ -416,7 +416,7 @@ def _read_scene_linkage(
     types = effect_types(effects, not_imported)
     if published is None:
         published = not drive_class(drive).is_measured or any(
-            each.without_inputs for each in types.values()
+            effect.without_inputs for effect in types.values()
         )
     if closure is None:
         closure = read_any_closure(
@@ -426,7 +426,7 @@ def _read_scene_linkage(
         )
     linkage = closure.linkage
     _refuse_effects(effects, types, drive, published)
-    kinds = {bool(given.slider) for given in linkage.inputs}
+    kinds = {bool(driven.slider) for driven in linkage.inputs}
     for section in (own, scene):
         section.units = replace(section.units, slides=kinds == {True} if len(kinds) == 1 else None)
     parts = {**parts_of(linkage), 'left_out': not_imported}

@@ -288,12 +288,12 @@ class _AngleWords(Kind):
         return content.choose_words(key, (PUBLISHED_ANGLES, ANGLES))
 
     def json_schema(self) -> Schema:
-        one = {'enum': [*PUBLISHED_ANGLES, *ANGLES]}
+        word = {'enum': [*PUBLISHED_ANGLES, *ANGLES]}
         return {
             'description': self.meaning,
             'if': {'type': 'array'},
-            'then': {'items': one, 'maxItems': 2, 'uniqueItems': True},
-            'else': one,
+            'then': {'items': word, 'maxItems': 2, 'uniqueItems': True},
+            'else': word,
         }
 
 
@@ -414,7 +414,7 @@ class _InMemoryOrOnDisk(Rule):
             raise content.error('keep_files', 'the bag has only one file', remedy)
 
     def json_schema(self) -> Schema:
-        one = {'required': ['split_bytes'], 'properties': {'split_bytes': {'maximum': 0}}}
+        unsplit = {'required': ['split_bytes'], 'properties': {'split_bytes': {'maximum': 0}}}
         one_file = f'without {" or ".join(SPLITS)} there is one file'
         in_memory = 'leave it out: with snapshot_seconds the run is kept in memory'
         not_in_memory = 'leave it out: without snapshot_seconds nothing is kept in memory'
@@ -423,7 +423,7 @@ class _InMemoryOrOnDisk(Rule):
         return {
             'allOf': [
                 {
-                    'if': {'anyOf': [{'not': one}, _has_value('split_seconds')]},
+                    'if': {'anyOf': [{'not': unsplit}, _has_value('split_seconds')]},
                     'else': {
                         'properties': {'keep_files': {'description': one_file, 'maximum': 0}}
                     },
@@ -531,7 +531,7 @@ def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _refused_pairs() -> Schema:
-    """Return the schema that refuses an effect beside a drive that excludes it."""
+    """Return the schema that refuses an effect with a drive that excludes it."""
     drives: dict[str, dict[str, bool]] = {}
     for name in EFFECTS:
         for drive in effect_class(name).refused_drives:
@@ -553,12 +553,12 @@ def scene_schema() -> Schema:
     named = _NAMED_LINKAGE.json_schema()
     either = {'description': f'{_NAMED_LINKAGE.meaning}; or a robot', **robot, 'else': named}
     name = TextOf('its name, and the prefix of its joints: letters, digits and _', _ROS_NAME)
-    one = mapping_schema(
+    single = mapping_schema(
         'A linkage; keys that it leaves out have the values of the scene.',
         {'name': name.json_schema(), 'linkage': linkage, **own},
         required=('name', 'linkage'),
     )
-    several = one_or_more('Several linkages instead of one.', one | _refused_pairs())
+    several = one_or_more('Several linkages instead of one.', single | _refused_pairs())
     keys = parameters_schema(SCENE)['properties'] | own
     return {
         '$schema': DIALECT,

@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Set keys of a scene beside its file: ``rate=500``, ``drive.sine.amplitude=0.3``."""
+"""Set keys of a scene without editing its file: ``rate=500``, ``drive.sine.amplitude=0.3``."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _linkage_names(entries: Any) -> list[str]:
     """Return the names of the linkages in a list; [] for anything else."""
     if not isinstance(entries, list):
         return []
-    return [str(one.get('name')) if isinstance(one, LinedDict) else '' for one in entries]
+    return [str(entry.get('name')) if isinstance(entry, LinedDict) else '' for entry in entries]
 
 
 def _parse_value(setting: str, text: str) -> Any:
@@ -113,7 +113,7 @@ def _parse_value(setting: str, text: str) -> Any:
 def blame_setting(error: FileError, content: Section, settings: Sequence[str]) -> FileError:
     """Return an error of a scene; it names the setting that it is about instead of the file."""
     blamed = _blame(error, content, settings)
-    blamed.others = [_blame(other, content, settings) for other in error.others]
+    blamed.others = [_blame(further, content, settings) for further in error.others]
     return blamed
 
 
@@ -137,9 +137,9 @@ def _counted_key(content: Section, key: str) -> str:
     return f'{first}[{names.index(name) + 1}]{dot}{last}' if name in names else key
 
 
-def _is_within(key: str, other: str) -> bool:
+def _is_within(key: str, other_key: str) -> bool:
     """Return whether one key lies within the other, or is the same."""
-    short, long = sorted((key, other), key=len)
+    short, long = sorted((key, other_key), key=len)
     return bool(key) and f'{long}.'.startswith(f'{short}.')
 
 

@@ -162,7 +162,7 @@ class _SdfReader:
         own = self._frame(name)
         axis = part.find('axis')
         first, second = (
-            self._read_axis(found, own, where) for found in (axis, part.find('axis2'))
+            self._read_axis(element, own, where) for element in (axis, part.find('axis2'))
         )
         if _KINDS[kind] == 'universal' and length(cross(first, second)) < _PARALLEL:
             remedy = 'write an <axis2> across the first; it is 0 0 1 where none is written'

@@ -101,8 +101,8 @@ class Section:
             raise self.error(
                 key, f'{quote(value)} is not a number', f'write a number{_unit_text(name)}'
             )
-        found = self._to_si(key, value, unit)
-        if not isfinite(found) or not least <= found <= most or found <= above:
+        in_si = self._to_si(key, value, unit)
+        if not isfinite(in_si) or not least <= in_si <= most or in_si <= above:
             bounds = ' and '.join(
                 f'{word} {self.units.to_file_unit(bound, unit):g}'
                 for word, bound in (('more than', above), ('at least', least), ('at most', most))
@@ -113,7 +113,7 @@ class Section:
                 f'{quote(value)} is out of bounds',
                 f'write a finite number{bounds and f", {bounds}"}{name and f" [{name}]"}',
             )
-        return found
+        return in_si
 
     def whole_number(
         self,
@@ -173,8 +173,8 @@ class Section:
         """
         value = self._take_value(key, [], 'a word')
         named = value if isinstance(value, list) else [value]
-        found = [[word for word in named if word in group] for group in groups]
-        if sum(map(len, found)) != len(named) or any(len(words) > 1 for words in found):
+        chosen = [[word for word in named if word in group] for group in groups]
+        if sum(map(len, chosen)) != len(named) or any(len(words) > 1 for words in chosen):
             choices = ', '.join(' or '.join(group) for group in groups)
             both = ', '.join(group[-1] for group in groups)
             raise self.error(
@@ -183,7 +183,7 @@ class Section:
                 f'write {choices}, or one of each: [{both}]',
             )
         return [
-            words[0] if words else group[0] for words, group in zip(found, groups, strict=True)
+            words[0] if words else group[0] for words, group in zip(chosen, groups, strict=True)
         ]
 
     def point(self, key: str, *, most: float = inf, unit: str = '') -> tuple[float, float]:
@@ -258,17 +258,17 @@ class Section:
         value = self._take_value(key, None, 'a mapping')
         if not isinstance(value, list):
             return [self.section(key, example=example)]
-        found = []
+        sections = []
         for i, item in enumerate(value, 1):
             path = '.'.join(filter(None, (self._path, f'{key}[{i}]')))
             if not isinstance(item, dict):
                 raise self.error(
                     key, f'{quote(item)} is not a mapping', f'write {_as_mapping(item, example)}'
                 )
-            found.append(Section(self.file, path, item, self._line_of(key), self.units))
-        if not found:
+            sections.append(Section(self.file, path, item, self._line_of(key), self.units))
+        if not sections:
             raise self.error(key, 'the list is empty', 'name at least one')
-        return found
+        return sections
 
     def numbers(self, key: str, *, most: float = inf, unit: str = '') -> list[float]:
         """Return a list of finite numbers, each within ±most."""
@@ -277,9 +277,9 @@ class Section:
             raise self.error(
                 key, f'{quote(value)} is not a list of finite numbers', 'write [0.1, 0.2]'
             )
-        found = [self._to_si(key, v, unit) for v in value]
-        self._check_most(key, value, found, most, unit)
-        return found
+        numbers = [self._to_si(key, v, unit) for v in value]
+        self._check_most(key, value, numbers, most, unit)
+        return numbers
 
     def rows(
         self, key: str, columns: Sequence[str], *, most: float = inf
@@ -295,14 +295,16 @@ class Section:
         table: list[tuple[float, ...]] = []
         if not isinstance(value, list) or not value:
             raise self.error(key, f'{quote(value)} is not a list of rows', f'write [{row}, …]')
-        for number, found in enumerate(value, 1):
-            if not _is_list_of_finite(found) or len(found) != len(units):
+        for number, numbers_of_row in enumerate(value, 1):
+            if not _is_list_of_finite(numbers_of_row) or len(numbers_of_row) != len(units):
                 raise self.error(
-                    key, f'row {number}, {quote(found)}, is not {row}', 'write finite numbers'
+                    key,
+                    f'row {number}, {quote(numbers_of_row)}, is not {row}',
+                    'write finite numbers',
                 )
-            table.append(tuple(map(self._to_si, repeat(key), found, units)))
+            table.append(tuple(map(self._to_si, repeat(key), numbers_of_row, units)))
             for value, unit in zip(table[-1], units, strict=True):
-                self._check_most(key, found, (value,), most, unit)
+                self._check_most(key, numbers_of_row, (value,), most, unit)
         return tuple(table)
 
     def texts(self, key: str) -> list[str]:
@@ -357,9 +359,9 @@ class Section:
         return float(self.units.to_si(value, unit))
 
     def _check_most(
-        self, key: str, value: Any, found: Iterable[float], most: float, unit: str
+        self, key: str, value: Any, numbers: Iterable[float], most: float, unit: str
     ) -> None:
-        if any(abs(one) > most for one in found):
+        if any(abs(number) > most for number in numbers):
             name = self.units.file_unit(unit)
             raise self.error(
                 key,
@@ -381,7 +383,7 @@ def _has_decimal_comma(numbers: Sequence[float]) -> bool:
     """Return whether two numbers with commas, such as 0,040 and 0, may have been typed."""
     if not all(float(part).is_integer() for part in numbers):
         return False
-    return len(numbers) > 3 or any(one == 0 < other for one, other in pairwise(numbers))
+    return len(numbers) > 3 or any(number == 0 < after for number, after in pairwise(numbers))
 
 
 def _is_number(value: Any) -> bool:
@@ -401,10 +403,10 @@ def _as_mapping(value: Any, example: Callable[[str], str] | None) -> str:
     example = example or (lambda name: '{}' if name else '{…}')
     names = value if isinstance(value, list) else [value]
     named = names and all(isinstance(name, str) and fullmatch(r'\w+', name) for name in names)
-    found = {name: example(name) for name in names} if named else {}
-    if not all(found.values()) or not found:
+    examples = {name: example(name) for name in names} if named else {}
+    if not all(examples.values()) or not examples:
         return example('')
-    return f'{{{list_names(f"{name}: {of}" for name, of in found.items())}}}'
+    return f'{{{list_names(f"{name}: {of}" for name, of in examples.items())}}}'
 
 
 def _unit_text(unit: str) -> str:

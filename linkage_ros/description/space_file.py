@@ -73,25 +73,25 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
     joints: dict[str, dict[str, SpatialJoint]] = {}
     for kind in ('hinges', 'slides'):
         joints[kind] = {}
-        for joint, given in values.get(kind, {}).items():
-            of = dict(given)
+        for joint, values_of in values.get(kind, {}).items():
+            of = dict(values_of)
             if through := of.pop('through', None):
                 of |= _axis_through(content, f'{kind}.{joint}.through', through, points)
                 for link in (of['parent'], of['child']):
                     links[link] = tuple(dict.fromkeys((*links.get(link, ()), *through)))
             joints[kind][joint] = SpatialJoint(**of)
-    for ball, given in values.get('balls', {}).items():
-        for joint, made in _hinges_of_ball(ball, **given).items():
+    for ball, ball_values in values.get('balls', {}).items():
+        for joint, made in _hinges_of_ball(ball, **ball_values).items():
             if joint in joints['hinges'] or joint in links:
                 reason = f'{quote(joint)} is a hinge or a link of the file already'
                 raise content.error(f'balls.{ball}', reason, 'name the ball differently')
             joints['hinges'][joint] = made
-            massless += [made.parent] if made.parent != given['parent'] else []
+            massless += [made.parent] if made.parent != ball_values['parent'] else []
     struts = values.get('struts', {})
     names = [*joints['hinges'], *joints['slides'], *struts]
-    for one in names:
-        if names.count(one) > 1:
-            raise content.error('', f'two joints are named {quote(one)}', 'name each differently')
+    for name in names:
+        if names.count(name) > 1:
+            raise content.error('', f'two joints are named {quote(name)}', 'name each differently')
     units = {name: 'm' if name in sliding else 'rad' for name in names}
     driven = values['input']
     published = values.get('joints') or tuple(name for name in names if name not in driven)
@@ -117,19 +117,19 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
         return linkage  # Which cannot be closed: its points are checked first
     check_weighed(linkage.link_names, weighed)
     masses = {
-        link: _mass_of(content, link, given, [points[name] for name in links.get(link, ())])
-        for link, given in weighed.items()
+        link: _mass_of(content, link, mass, [points[name] for name in links.get(link, ())])
+        for link, mass in weighed.items()
     }
     return linkage.with_masses(masses, massless=massless)
 
 
 def _mass_of(
-    content: Section, link: str, given: dict[str, Any], places: Sequence[Vector]
+    content: Section, link: str, values: dict[str, Any], places: Sequence[Vector]
 ) -> SpatialMass:
     """Return the mass of a link, which may be written as that of a rod."""
-    if is_rod(content, link, given, places):
-        return thin_rod(given['mass'], places[0], places[1])
-    return SpatialMass(**given)
+    if is_rod(content, link, values, places):
+        return thin_rod(values['mass'], places[0], places[1])
+    return SpatialMass(**values)
 
 
 def _refuse_single_ends(content: Section, values: Mapping[str, Any]) -> None:
@@ -137,9 +137,9 @@ def _refuse_single_ends(content: Section, values: Mapping[str, Any]) -> None:
     ratios = values.get('ratios', {})
     geared = {*ratios, *(of for ratio in ratios.values() for of in ratio.terms)}
     ends = [
-        (kind, joint, end, given[end])
+        (kind, joint, end, ends_of[end])
         for kind in ('hinges', 'slides', 'balls')
-        for joint, given in values.get(kind, {}).items()
+        for joint, ends_of in values.get(kind, {}).items()
         for end in ('parent', 'child')
     ]
     named = Counter(link for *_, link in ends)
@@ -169,11 +169,11 @@ def _axis_through(
         if name not in points:
             remedy = did_you_mean(name, points, f'name one of {list_names(sorted(points))}')
             raise content.error(key, f'there is no point {quote(name)}', remedy)
-    one, other = (points[name] for name in names)
-    if one == other:
+    first, second = (points[name] for name in names)
+    if first == second:
         reason = f'{quote(names[0])} and {quote(names[1])} are in one place'
         raise content.error(key, reason, 'name two points apart')
-    return {'at': one, 'axis': tuple(b - a for a, b in zip(one, other, strict=True))}
+    return {'at': first, 'axis': tuple(b - a for a, b in zip(first, second, strict=True))}
 
 
 def _names(content: Section, key: str) -> list[str]:

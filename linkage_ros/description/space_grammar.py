@@ -65,10 +65,12 @@ class _Tensor(NumberList):
     """Six finite numbers [ixx, ixy, ixz, iyy, iyz, izz]."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, ...]:
-        found = NumberList.read(self, content, key, parts, folder)
-        if len(found) != len(_MOMENTS):
-            raise content.error(key, f'has {len(found)} numbers', f'write [{", ".join(_MOMENTS)}]')
-        return found
+        moments = NumberList.read(self, content, key, parts, folder)
+        if len(moments) != len(_MOMENTS):
+            raise content.error(
+                key, f'has {len(moments)} numbers', f'write [{", ".join(_MOMENTS)}]'
+            )
+        return moments
 
     def json_schema(self) -> Schema:
         return {**NumberList.json_schema(self), 'minItems': 6, 'maxItems': 6}
@@ -204,7 +206,7 @@ SPACE = Keys(
         ),
         'joints': declare(
             ListOf(
-                'Published joints, in this order; all others that are no inputs if left out.',
+                'Published joints, in this order; all others that are not inputs if left out.',
                 TextOf('a joint'),
             ),
             None,

@@ -79,7 +79,7 @@ class Units:
 
     def is_ambiguous(self, unit: str) -> bool:
         """Return whether the same number would be two quantities, of an angle and of a slide."""
-        return len({self._si_factor(one) for one in self._unit_alternatives(unit)}) > 1
+        return len({self._si_factor(name) for name in self._unit_alternatives(unit)}) > 1
 
     def to_si(self, value: float, unit: str) -> float:
         """Return a value of the file in SI, correctly rounded."""
@@ -104,13 +104,13 @@ class Units:
         """
         return text if self.is_si else _QUANTITY.sub(self._converted_quantity, text)
 
-    def _converted_quantity(self, found: re.Match[str]) -> str:
-        numbers, unit = found.groups()
+    def _converted_quantity(self, match: re.Match[str]) -> str:
+        numbers, unit = match.groups()
         if self.si_per_unit(unit) == 1.0:
-            return found[0]
+            return match[0]
         # One digit less than the text has: 1.5708 rad are 90 deg.
         values = re.sub(
-            _NUMBER, lambda one: f'{self.to_file_unit(float(one[0]), unit):.5g}', numbers
+            _NUMBER, lambda number: f'{self.to_file_unit(float(number[0]), unit):.5g}', numbers
         )
         return f'{values} {self.file_unit(unit)}'
 
@@ -122,19 +122,19 @@ class Units:
         return both[-1:] if self.slides else both[:1]
 
     def _si_factor(self, unit: str) -> Decimal:
-        found = _CONVERTED.fullmatch(unit)
-        if found is None:
+        match = _CONVERTED.fullmatch(unit)
+        if match is None:
             return Decimal(1)
-        if found[1] == 'm':
+        if match[1] == 'm':
             return LENGTHS[self.length]
         return _DEGREE if self.angle == 'degrees' else Decimal(1)
 
     def _converted_unit(self, unit: str) -> str:
-        found = _CONVERTED.fullmatch(unit)
-        if found is None:
+        match = _CONVERTED.fullmatch(unit)
+        if match is None:
             return unit
         angle = 'deg' if self.angle == 'degrees' else 'rad'
-        return (self.length if found[1] == 'm' else angle) + found[2]
+        return (self.length if match[1] == 'm' else angle) + match[2]
 
 
 _SMALLEST = Units('mm', 'degrees')
@@ -142,4 +142,4 @@ _SMALLEST = Units('mm', 'degrees')
 
 def most_in_one(unit: str) -> float:
     """Return how many of the smallest units that a file can name make one unit in SI."""
-    return max(_SMALLEST.to_file_unit(1.0, one) for one in unit.split(' or '))
+    return max(_SMALLEST.to_file_unit(1.0, alternative) for alternative in unit.split(' or '))

@@ -160,12 +160,12 @@ def pin_frames(urdf: UrdfFile) -> dict[str, list[str]]:
     """
     firsts = (link for link in urdf.links if _CLOSING.fullmatch(link))
     pairs = {first[:-2]: [first, f'{first[:-1]}2'] for first in firsts}
-    found = {name: ends for name, ends in pairs.items() if ends[1] in urdf.links}
+    frames = {name: ends for name, ends in pairs.items() if ends[1] in urdf.links}
     for joint in urdf.joints.values():
         name, on, parent = joint.child.rpartition(f'_on_{joint.parent}')
         if on and name and not parent:
-            found.setdefault(name, []).append(joint.child)
-    return found
+            frames.setdefault(name, []).append(joint.child)
+    return frames
 
 
 def read_urdf_file(file: Path) -> bytes:
@@ -225,7 +225,11 @@ class _UrdfReader:
         if not links:
             raise self._file_error('', 'has no link', 'name a URDF file')
         start = root.find('linkage_start')
-        made_up = {} if start is None else {each.get('name', ''): _made_up(each) for each in start}
+        made_up = (
+            {}
+            if start is None
+            else {element.get('name', ''): _made_up(element) for element in start}
+        )
         joints: dict[str, UrdfJoint] = {}
         for element in root.findall('joint'):
             name = self._checked_name(element, joints, 'joint')
@@ -238,7 +242,11 @@ class _UrdfReader:
             raise self._file_error('', reason, f'keep the part with the loops: {MOST_JOINTS}')
         self._check_mimics(joints)
         base, ordered = self._order_joints(links, joints)
-        said = [] if start is None else [each for each in start if each.get('name') in joints]
+        said = (
+            []
+            if start is None
+            else [element for element in start if element.get('name') in joints]
+        )
         return UrdfFile(
             self._file,
             root.get('name', ''),
@@ -246,11 +254,11 @@ class _UrdfReader:
             links,
             {joint.name: joint for joint in ordered},
             tuple(joints),
-            tuple(each.get('name', '') for each in said if each.tag == 'input'),
+            tuple(element.get('name', '') for element in said if element.tag == 'input'),
             tuple(_actuated_joints(root, joints)),
             {
-                each.get('name', ''): self._read_value(each, 'value', 'linkage_start')
-                for each in said
+                element.get('name', ''): self._read_value(element, 'value', 'linkage_start')
+                for element in said
             },
             tuple(self._read_loops(root, links)),
             tuple(self._read_couplings(root, links)),
@@ -261,11 +269,11 @@ class _UrdfReader:
     def _read_loops(self, root: ET.Element, links: Mapping[str, object]) -> Iterator[UrdfLoop]:
         """Yield what closes loops; of two at one place the first."""
         there = set()
-        found = [each for each in root if each.tag in _LOOP_TAGS]
-        if len(found) > _MOST_LOOPS:
-            reason = f'has {len(found)} loops'
+        loops = [element for element in root if element.tag in _LOOP_TAGS]
+        if len(loops) > _MOST_LOOPS:
+            reason = f'has {len(loops)} loops'
             raise self._file_error('', reason, f'keep those that are needed: {_MOST_LOOPS}')
-        for number, element in enumerate(found):
+        for number, element in enumerate(loops):
             name = element.get('name') or f'{element.tag}{number + 1}'
             where, kind = f'{element.tag} {name}', element.get('type', '').removesuffix('_joint')
             ends = self._read_loop_ends(element, where, links)
@@ -279,17 +287,20 @@ class _UrdfReader:
     ) -> tuple[LoopEnd, LoopEnd]:
         for tags in _LOOP_ENDS:
             # Some write link1 twice.
-            found = [each for each in element if each.tag in tags]
-            if len(found) == 2:
+            ends_found = [part for part in element if part.tag in tags]
+            if len(ends_found) == 2:
                 break
         else:
             raise self._file_error(where, 'has no two ends', 'write <parent> and <child>')
         ends: list[LoopEnd] = []
-        for end, axes in zip(found, (('parent_axis', 'axis'), ('child_axis',)), strict=True):
+        for end, axes in zip(ends_found, (('parent_axis', 'axis'), ('child_axis',)), strict=True):
             link = self._checked_link(end.get('link', ''), end.tag, where, links)
             own = (end.find('origin'), element.find(f'{end.tag}_origin'))
-            origin = next((each for each in own if each is not None), end)
-            axis = next((each for each in map(element.find, axes) if each is not None), None)
+            origin = next((place for place in own if place is not None), end)
+            axis = next(
+                (line for line in map(element.find, axes) if line is not None),
+                None,
+            )
             way = ends[0].axis if ends else (1.0, 0.0, 0.0)
             way = way if axis is None else self._read_vector(axis, 'xyz', where, '1 0 0')
             if way == (0.0, 0.0, 0.0):
@@ -444,8 +455,8 @@ class _UrdfReader:
     def _read_end(
         self, element: ET.Element, end: str, where: str, links: Mapping[str, object]
     ) -> str:
-        found = element.find(end)
-        link = found.get('link', '') if found is not None else ''
+        closing = element.find(end)
+        link = closing.get('link', '') if closing is not None else ''
         return self._checked_link(link, end, where, links)
 
     def _checked_link(self, link: str, end: str, where: str, links: Mapping[str, object]) -> str:

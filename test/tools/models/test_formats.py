@@ -302,7 +302,7 @@ REFUSED = {
                      'r.xml: is nested too deeply; use fewer levels'),
     'closings without a URDF': ('r.yaml', 'closed_loop: [[a, b]]',
                                 ('r.yaml: closed_loop: closes loops of no URDF; write the URDF '
-                                 'beside it as r.urdf')),
+                                 'next to it as r.urdf')),
 }  # fmt: skip
 
 
