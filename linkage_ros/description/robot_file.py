@@ -100,7 +100,7 @@ _MOST_TRIED = 20
 """Most choices of mimics that are tried."""
 
 ROBOT = Keys(
-    'A robot whose URDF has loops; all joints in them that are no inputs are published.',
+    'A robot whose URDF has loops; all joints in them that are not inputs are published.',
     dict,
     {
         'urdf': text('path of the URDF, relative to the folder of this file'),
@@ -136,7 +136,7 @@ def read_robot_closure(
     """Read the loops of a robot and check that they close, as `read_any_closure` does."""
     urdf = read_urdf(content.named_data, content.mapping['urdf'])
     slides = [joint.name for joint in urdf.joints.values() if joint.kind == 'prismatic']
-    given = read_parameters(content, ROBOT, {'slide': slides})
+    keys = read_parameters(content, ROBOT, {'slide': slides})
 
     def close(robot: _Robot, without: Sequence[str]) -> Closure:
         linkage = robot.linkage(publish_inputs, without)
@@ -146,7 +146,7 @@ def read_robot_closure(
 
     robot: _Robot | None = None
     try:
-        robot = _Robot(urdf, given['input'], given['at'], given['close'], given['near'])
+        robot = _Robot(urdf, keys['input'], keys['at'], keys['close'], keys['near'])
         robot.check_driven()
         errors: list[DefinitionError] = []
         idle: list[Closure] = []
@@ -165,7 +165,7 @@ def read_robot_closure(
         raise errors[:2][-1]
     except DefinitionError as error:
         section, _, part = error.where.partition('.')
-        if section == 'input' and robot and not given['input'] and (sets := robot.input_sets()):
+        if section == 'input' and robot and not keys['input'] and (sets := robot.input_sets()):
             written = [' '.join(f'--input {name}' for name in names) for names in sets]
             remedy = f'write {", or ".join(written)}; in a scene input: [{", ".join(sets[0])}]'
             raise content.error('', error.reason, remedy) from None
@@ -232,7 +232,7 @@ class _Robot:
             name for name, ratio in self._ratios.items() if {name, *ratio.terms} <= looped
         ]
         """Joints that follow others in loops, which may move them as well."""
-        kept, known = (set().union(*(one for one, _ in of)) for of in (chosen, groups))
+        kept, known = (set().union(*(names for names, _ in of)) for of in (chosen, groups))
         self._moving = [name for name in moving if name in kept]
         self._check(moving, known, chosen, told)
         children = {urdf.joints[name].child for name in self._moving}
@@ -249,13 +249,13 @@ class _Robot:
     def _find_groups(self) -> list[tuple[set[str], list[UrdfLoop]]]:
         """Return the joints that loops and ratios tie together, with the loops."""
         groups: list[tuple[set[str], list[UrdfLoop]]] = []
-        found = [(self._names_of(loop), [loop]) for loop in self._loops]
-        found += [({name, *ratio.terms}, []) for name, ratio in self._ratios.items()]
-        for names, loops in found:
+        tied_sets = [(self._names_of(loop), [loop]) for loop in self._loops]
+        tied_sets += [({name, *ratio.terms}, []) for name, ratio in self._ratios.items()]
+        for names, loops in tied_sets:
             tied = [group for group in groups if group[0] & names]
             groups = [group for group in groups if group not in tied]
             tied_names = names.union(*(group[0] for group in tied))
-            groups.append((tied_names, [*(one for _, of in tied for one in of), *loops]))
+            groups.append((tied_names, [*(loop for _, of in tied for loop in of), *loops]))
         return groups
 
     def _find_actuated(self) -> list[str]:
@@ -340,9 +340,13 @@ class _Robot:
             linkage = self.linkage(False, self._needless, tuple(names))
         except DefinitionError:
             return []
-        found = find_input_sets(linkage, CarriedPoints(linkage, unit_of(linkage)), names)
-        kinds = [len({(limits[k].effort, limits[k].velocity) for k in one}) for one in found]
-        least = [one for one, count in zip(found, kinds, strict=True) if count == min(kinds)]
+        input_sets = find_input_sets(linkage, CarriedPoints(linkage, unit_of(linkage)), names)
+        kinds = [
+            len({(limits[k].effort, limits[k].velocity) for k in names}) for names in input_sets
+        ]
+        least = [
+            names for names, count in zip(input_sets, kinds, strict=True) if count == min(kinds)
+        ]
         return least[:_MOST_TOLD]
 
     def _error(self, where: str, reason: str, remedy: str) -> FileError:
@@ -370,9 +374,9 @@ class _Robot:
 
     def _is_geared(self, name: str) -> bool:
         """Return whether a joint turns against a link that the joint that it follows does."""
-        joints = (self._urdf.joints[each] for each in (name, *self._ratios[name].terms))
-        one, *others = ({self._tree.body(of.parent), of.child} for of in joints)
-        return not any(map(one.isdisjoint, others))
+        joints = (self._urdf.joints[joint] for joint in (name, *self._ratios[name].terms))
+        first_ends, *others = ({self._tree.body(of.parent), of.child} for of in joints)
+        return not any(map(first_ends.isdisjoint, others))
 
     def _read_close(self, asked: str) -> UrdfLoop:
         """Read FRAME=FRAME[:KIND]; the axis of a hinge is the z axis of the first frame."""
@@ -381,18 +385,18 @@ class _Robot:
             pair, kind = asked, 'ball'
         ends = []
         for name in pair.split('='):
-            found = None if name in self._urdf.links else PLACE.fullmatch(name)
-            link, *place = found.groups() if found else (name, 0, 0, 0)
+            match = None if name in self._urdf.links else PLACE.fullmatch(name)
+            link, *place = match.groups() if match else (name, 0, 0, 0)
             if link not in self._urdf.links:
                 remedy = did_you_mean(link, self._urdf.links, 'name a link, or LINK.x,y,z')
                 raise DefinitionError('close', f'there is no link {quote(link)}', remedy)
             x, y, z = map(float, place)
-            directed = found is None and kind == 'fixed'
+            directed = match is None and kind == 'fixed'
             ends.append(LoopEnd(link, (x, y, z), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), directed))
         if len(ends) != 2:
             raise DefinitionError('close', f'{quote(asked)} is not a pair', 'write FRAME=FRAME')
-        body, other = (self._tree.body(end.link) for end in ends)
-        if body == other:
+        body, second_body = (self._tree.body(end.link) for end in ends)
+        if body == second_body:
             reason = f'{quote(asked)} is within {quote(body)}, in which nothing moves'
             raise DefinitionError('close', reason, 'name frames of two links that move')
         return UrdfLoop(f'{ends[0].link}_pin', kind, (ends[0], ends[1]))
@@ -405,8 +409,8 @@ class _Robot:
             if slider != pin and not others and len(pins.get(slider, ())) == 1:
                 ends = LoopEnd(first, ZERO), LoopEnd(pins[slider][0], ZERO)
                 yield UrdfLoop(slider, LINE, ends)
-            for number, other in enumerate(others):
-                ends = LoopEnd(first, ZERO), LoopEnd(other, ZERO)
+            for number, further_pin in enumerate(others):
+                ends = LoopEnd(first, ZERO), LoopEnd(further_pin, ZERO)
                 yield UrdfLoop(f'{pin}_{number}' if number else pin, 'ball', ends)
         frames = self._tree.place_links({}) if self._urdf.pinned else {}
         for child, parent, place, kind in self._urdf.pinned:
@@ -417,16 +421,16 @@ class _Robot:
 
     def _places_of(self, loop: UrdfLoop) -> frozenset[tuple[str, Vector]]:
         """Return the ends of a loop as places on links that move."""
-        found = set()
+        places = set()
         for end in loop.ends:
             link, place = end.link, end.xyz
             for joint in self._tree.above[link]:
                 if joint.kind != 'fixed':
                     break
                 link, place = joint.parent, self._tree.bases[joint.name].place(place)
-            x, y, z = (round(one, 9) for one in place)
-            found.add((link, (x, y, z)))
-        return frozenset(found)
+            x, y, z = (round(coordinate, 9) for coordinate in place)
+            places.add((link, (x, y, z)))
+        return frozenset(places)
 
     def _find_ratios(self) -> Iterator[tuple[str, Ratio]]:
         """Yield the joints that follow others: mimics and couplings."""
@@ -435,19 +439,21 @@ class _Robot:
                 yield joint.name, Ratio(joint.mimics, joint.multiplier, joint.offset)
         for name, predecessor, successor, ratio in self._urdf.couplings:
             ways = self._tree.ways(predecessor, successor)
-            leaders, followers = ([one.name for one in way if one.kind in MOVING] for way in ways)
+            leaders, followers = (
+                [joint.name for joint in way if joint.kind in MOVING] for way in ways
+            )
             if not leaders or not followers or not ratio:
                 reason = f'couples {len(leaders)} and {len(followers)} joints by {ratio:g}'
                 remedy = 'name links that joints move, and a ratio other than 0'
                 raise self._error(name, reason, remedy)
             # The sum of the followers is the ratio times the sum of the leaders.
             terms = {**dict.fromkeys(followers, -1.0), **dict.fromkeys(leaders, ratio)}
-            moved = next((each for each in terms if each not in self._driven), None)
+            moved = next((term for term in terms if term not in self._driven), None)
             if moved is None:
                 reason = f'couples the inputs {list_names(terms)}'
                 raise self._error(name, reason, 'leave one of them out of the inputs')
             by = -terms.pop(moved)
-            (of, first), *others = ((each, factor / by) for each, factor in terms.items())
+            (of, first), *others = ((term, factor / by) for term, factor in terms.items())
             yield moved, Ratio(of, first, also=dict(others))
 
     # The linkage
@@ -469,9 +475,9 @@ class _Robot:
         values = pose.move(told, {}, self._ratios)
         frames = self._tree.place_links(values)
         open_by, turned_by = (
-            max(zip(map(length, found), (loop.name for loop in loops), strict=True),
+            max(zip(map(length, errors), (loop.name for loop in loops), strict=True),
                 default=(0.0, ''))
-            for found, loops in ((pose.gaps(frames), pose.closed),
+            for errors, loops in ((pose.gaps(frames), pose.closed),
                                  (pose.turns(frames), pose.directed))
         )  # fmt: skip
         for (apart, worst), unit, most in (
@@ -492,7 +498,7 @@ class _Robot:
         for joint in joints.values():
             own = f'{GROUND}_link' if joint.child == GROUND else joint.child
             above = self._tree.above[joint.child]
-            is_carried = any(one.name in self._carriers for one in above)
+            is_carried = any(joint.name in self._carriers for joint in above)
             still = on[joint.parent] if is_carried or joint.kind == 'fixed' else GROUND
             on[joint.child] = own if joint.name in self._moving else still
         for loop in self._loops:
@@ -507,12 +513,12 @@ class _Robot:
             if ends[0] != ends[1]:  # It is not held by a fixed loop.
                 joined = SpatialJoint(*ends, axis, frame.origin, values[name], limits)
                 (made.slides if joint.kind == 'prismatic' else made.hinges)[name] = joined
-        found = [*made.hinges, *made.slides]
+        movable = [*made.hinges, *made.slides]
         for loop in self._loops:
             self._add_loop(loop, [on[end.link] for end in loop.ends], frames, made)
         traced = tuple(self._add_traced(on, frames, made))
-        published = [k for k in self._moving if k in found and k not in driven]
-        left_out = [k for k, joint in joints.items() if joint.kind != 'fixed' and k not in found]
+        published = [k for k in self._moving if k in movable and k not in driven]
+        left_out = [k for k, joint in joints.items() if joint.kind != 'fixed' and k not in movable]
         left_out += [f'mimic of {name}' for name in without]
         left_out += [
             f'limits of {name}'
@@ -524,7 +530,7 @@ class _Robot:
             struts={},
             driven=driven,
             published=(*(driven if publish_inputs else ()), *published),
-            ratios={name: of for name, of in ratios.items() if name in found},
+            ratios={name: of for name, of in ratios.items() if name in movable},
             traced=traced,
             left_out=(*left_out, *(f'{tag} (not read)' for tag in self._urdf.unread)),
             corrections=PoseCorrections(
@@ -543,14 +549,14 @@ class _Robot:
             near = near and pose.find_near(near, driven, ratios)
         return near
 
-    def _remedy_of(self, found: Mapping[str, float] | None, ratios: Mapping[str, Ratio]) -> str:
+    def _remedy_of(self, values: Mapping[str, float] | None, ratios: Mapping[str, Ratio]) -> str:
         """Return the remedy for loops that are open, with a pose near it in which they close."""
-        if found is None:
+        if values is None:
             return 'give values of joints at which all loops close'
         pose = [
-            f'{name}: {found[name]:.6g}'
+            f'{name}: {values[name]:.6g}'
             for name in self._moving
-            if name not in ratios and abs(found[name]) > _NEAR_ZERO
+            if name not in ratios and abs(values[name]) > _NEAR_ZERO
         ]
         if len(pose) > _MOST_TOLD:
             return 'near it all close: near: true (--near)'
@@ -563,7 +569,7 @@ class _Robot:
         parts: dict[str, list[SpatialMass]] = {}
         for name, body in self._urdf.links.items():
             way = (name, *(joint.parent for joint in self._tree.above[name]))
-            carrier = next((on[each] for each in way if on[each] in links), None)
+            carrier = next((on[on_way] for on_way in way if on[on_way] in links), None)
             if body is not None and carrier is not None:
                 at = frames[name].compose(frame_of(body.xyz, body.rpy))
                 part = SpatialMass(body.mass, at.origin, turned_tensor(at[:3], body.tensor))

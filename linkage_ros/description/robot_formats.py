@@ -8,7 +8,7 @@
 
 
 """
-The formats of robots: URDF, SDF, MJCF, and a YAML file of closings beside a URDF.
+The formats of robots: URDF, SDF, MJCF, and a YAML file of closings next to a URDF.
 
 Such a file, as example-parallel-robots writes them, names pairs of frames that meet, what joints
 of the URDF really are, and the motors. It becomes a URDF that says all of this itself, which is
@@ -72,7 +72,7 @@ def _convert(root: ET.Element, name: str) -> bytes:
 def _with_closings(file: Path, data: bytes) -> bytes:
     urdf = urdf_beside(file)
     if urdf is None:
-        remedy = f'write the URDF beside it as {file.with_suffix(".urdf").name}'
+        remedy = f'write the URDF next to it as {file.with_suffix(".urdf").name}'
         raise FileError(file, CLOSINGS, 'closes loops of no URDF', remedy)
     root = parse_robot(read_urdf_file(urdf), str(urdf))
     add_closings(root, parse_yaml(data, str(file)))
@@ -86,9 +86,9 @@ def urdf_beside(file: Path) -> Path | None:
     A link to a file in another folder is none: who may read the one may not read all others.
     """
     named = file.with_suffix('.urdf')
-    found = [named] if named.is_file() else [*file.parent.glob('*.urdf')]
+    urdfs = [named] if named.is_file() else [*file.parent.glob('*.urdf')]
     folder = file.resolve().parent
-    return found[0] if len(found) == 1 and found[0].resolve().parent == folder else None
+    return urdfs[0] if len(urdfs) == 1 and urdfs[0].resolve().parent == folder else None
 
 
 def add_closings(robot: ET.Element, content: Section) -> None:
@@ -142,10 +142,10 @@ def add_closings(robot: ET.Element, content: Section) -> None:
 def _read_list(content: Section, key: str) -> list[Any]:
     """Return a list, empty if it is absent."""
     content.remove_key(key)
-    found = content.mapping.get(key, [])
-    if not isinstance(found, list):
-        raise content.error(key, f'{quote(found)} is not a list', 'write [A, B]')
-    return found
+    items = content.mapping.get(key, [])
+    if not isinstance(items, list):
+        raise content.error(key, f'{quote(items)} is not a list', 'write [A, B]')
+    return items
 
 
 def _check_choice(
@@ -181,4 +181,4 @@ def _hinges(joint: ET.Element, axes: str) -> Iterator[ET.Element]:
 def _set_axis(joint: ET.Element, axis: str) -> None:
     for old in joint.findall('axis'):
         joint.remove(old)
-    ET.SubElement(joint, 'axis', xyz=' '.join('1' if axis == each else '0' for each in 'XYZ'))
+    ET.SubElement(joint, 'axis', xyz=' '.join('1' if axis == letter else '0' for letter in 'XYZ'))

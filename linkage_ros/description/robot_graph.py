@@ -118,11 +118,11 @@ def _find_tree(
         reason = f'has {len(joints)} joints'
         raise FileError(graph.file, '', reason, f'keep the part with the loops: {MOST_JOINTS}')
     while len(places) <= len(graph.links):
-        left = [one for one in joints if not {one.parent, one.child} <= places.keys()]
-        joint = next((one for one in left if one.parent in places), None)
+        left = [joint for joint in joints if not {joint.parent, joint.child} <= places.keys()]
+        joint = next((candidate for candidate in left if candidate.parent in places), None)
         if joint is None:
             # A joint may be written from its child to its parent.
-            back = next((one for one in left if one.child in places), None)
+            back = next((candidate for candidate in left if candidate.child in places), None)
             joint = back and _reverse(back)
         if joint is None:
             loose = [link for link in graph.links if link not in places]
@@ -175,10 +175,10 @@ def _add_one(root: ET.Element, joint: GraphJoint, origin: Vector) -> None:
     if joint.kind != 'fixed':
         ET.SubElement(made, 'axis', xyz=_text(joint.axis))
     if joint.limits != NO_LIMITS:
-        given = joint.limits
+        limits = joint.limits
         bounds = {
-            'lower': given.low, 'upper': given.high, 'velocity': given.velocity,
-            'effort': given.effort,
+            'lower': limits.low, 'upper': limits.high, 'velocity': limits.velocity,
+            'effort': limits.effort,
         }  # fmt: skip
         told = {key: repr(value) for key, value in bounds.items() if not isinf(value)}
         ET.SubElement(made, 'limit', told)

@@ -50,7 +50,7 @@ _MOST_STEPS, _MOST_SEARCH_STEPS = 12, 60
 """Most steps to a pose: from one that rounding misses, and from any other."""
 
 _BESIDE = 1e-6
-"""Least distance of the ends of a pin that is no rounding of CAD, relative to the size."""
+"""Least distance of the ends of a pin that is not rounding of CAD, relative to the size."""
 
 _NUDGES = (0.0, 0.3, 1.0, 2.0)
 """How much joints are moved at random before a pose is sought, in [rad] and [m]."""
@@ -80,11 +80,12 @@ class RobotTree:
         self.bases = {joint.name: frame_of(joint.xyz, joint.rpy) for joint in urdf.joints.values()}
         """For each joint the frame of its child at 0, in that of its parent."""
 
-    def ways(self, one: str, other: str) -> list[list[UrdfJoint]]:
+    def ways(self, first: str, second: str) -> list[list[UrdfJoint]]:
         """Return the joints from two links up to their common ancestor."""
-        shared = {*self.above[one]} & {*self.above[other]}
+        shared = {*self.above[first]} & {*self.above[second]}
         return [
-            [joint for joint in self.above[link] if joint not in shared] for link in (one, other)
+            [joint for joint in self.above[link] if joint not in shared]
+            for link in (first, second)
         ]
 
     def body(self, link: str) -> str:
@@ -161,18 +162,18 @@ class RobotPose:
         return apart if apart > _BESIDE * self.size else 0.0
 
     def _gap(self, loop: UrdfLoop, frames: Mapping[str, SpaceFrame]) -> tuple[Vector, float]:
-        """Return by how much a loop is open, and its ends lie beside each other."""
-        one, other = (end_frame(end, frames) for end in loop.ends)
-        gap, axis = minus(other.origin, one.origin), one.turn(direction_of(loop.ends[0].axis))
+        """Return by how much a loop is open, and its ends lie next to each other."""
+        first, second = (end_frame(end, frames) for end in loop.ends)
+        gap, axis = minus(second.origin, first.origin), first.turn(direction_of(loop.ends[0].axis))
         along = dot(gap, axis) if loop.kind in _SLIDING else 0.0
-        gap, beside = minus(gap, scale(along, axis)), 0.0
+        gap, offset = minus(gap, scale(along, axis)), 0.0
         if normal := self._normal_of(loop, frames):
-            beside = dot(gap, normal)
-            gap = minus(gap, scale(beside, normal))
-        return gap, abs(beside)
+            offset = dot(gap, normal)
+            gap = minus(gap, scale(offset, normal))
+        return gap, abs(offset)
 
     def _normal_of(self, loop: UrdfLoop, frames: Mapping[str, SpaceFrame]) -> Vector | None:
-        """Return the normal of a loop that moves in a plane: pins may end beside each other."""
+        """Return the normal of a loop that moves in a plane: pins may end next to each other."""
         ways = chain(*self._tree.ways(*(end.link for end in loop.ends)))
         moving = [joint for joint in ways if joint.kind in MOVING]
         axes = [frames[joint.child].turn(direction_of(joint.axis)) for joint in moving]
@@ -190,15 +191,15 @@ class RobotPose:
         """Return by how much the second frame of each directed loop is turned, in [rad]."""
         turns = []
         for loop in self.directed:
-            one, other = (end_frame(end, frames) for end in loop.ends)
+            first, second = (end_frame(end, frames) for end in loop.ends)
             if loop.kind == 'hinge':
                 axes = [
                     frame.turn(direction_of(end.axis))
-                    for frame, end in zip((one, other), loop.ends, strict=True)
+                    for frame, end in zip((first, second), loop.ends, strict=True)
                 ]
                 turns.append(_turn_of_axis(*axes))
             else:
-                turns.append(_turn_of_frame(one, other))
+                turns.append(_turn_of_frame(first, second))
         return turns
 
     def _remaining_errors(self, frames: Mapping[str, SpaceFrame]) -> list[float]:
@@ -221,7 +222,7 @@ class RobotPose:
                 place = end_frame(loop.ends[1] if slides else end, frames).origin
                 for joint in way:
                     ratio = ratios.get(joint.name, Ratio(joint.name, 1.0))
-                    moved = [each for each in ratio.terms if each in rates]
+                    moved = [term for term in ratio.terms if term in rates]
                     if moved and joint.kind in MOVING:
                         frame = frames[joint.child]
                         rate = frame.turn(direction_of(joint.axis))
@@ -324,23 +325,23 @@ class RobotPose:
 
 def _is_directed(loop: UrdfLoop) -> bool:
     """Return whether what closes a loop says how the second frame lies in the first."""
-    one, other = loop.ends
+    first, second = loop.ends
     if loop.kind == 'hinge':
-        return other.is_directed
-    return loop.kind in ('fixed', 'slide') and one.is_directed and other.is_directed
+        return second.is_directed
+    return loop.kind in ('fixed', 'slide') and first.is_directed and second.is_directed
 
 
-def _turn_of_axis(one: Vector, other: Vector) -> Vector:
+def _turn_of_axis(first: Vector, second: Vector) -> Vector:
     """Return the turn from one axis to another, in [rad]; of a hinge both ways are one."""
-    sine, cosine = cross(one, other), dot(one, other)
+    sine, cosine = cross(first, second), dot(first, second)
     sine = sine if cosine >= 0.0 else scale(-1.0, sine)
     size = length(sine)
     return scale(atan2(size, abs(cosine)) / size, sine) if size else ZERO
 
 
-def _turn_of_frame(one: SpaceFrame, other: SpaceFrame) -> Vector:
+def _turn_of_frame(first: SpaceFrame, second: SpaceFrame) -> Vector:
     """Return the turn from one frame to another, in [rad]."""
-    pairs = [*zip(one[:3], other[:3], strict=True)]
+    pairs = [*zip(first[:3], second[:3], strict=True)]
     sine = scale(0.5, plus(plus(*(cross(*pair) for pair in pairs[:2])), cross(*pairs[2])))
     angle = atan2(size := length(sine), 0.5 * (sum(dot(*pair) for pair in pairs) - 1.0))
     if size > _ROUNDED:
