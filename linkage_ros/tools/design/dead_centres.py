@@ -59,7 +59,7 @@ def crank_rockers(task: DeadCentreTask, count: int) -> list[Design]:
         raise SynthesisError(
             'the time ratio', f'is {task.time_ratio:g}', 'give the longer time by the shorter one'
         )
-    found = []
+    candidates = []
     for side in (1.0, -1.0):
 
         def loss(ratio: float, side: float = side) -> float:
@@ -70,15 +70,15 @@ def crank_rockers(task: DeadCentreTask, count: int) -> list[Design]:
         if loss(best) < 0.0:
             step = 1.0 / _SAMPLES
             ends = max(best - step, step * step), min(best + step, 1.0 - step * step)
-            found.append((*golden_section(loss, *ends), side))
+            candidates.append((*golden_section(loss, *ends), side))
             usable = [ratio for ratio in ratios if loss(ratio) < 0.0]
             chosen = usable[:: max(1, len(usable) // max(1, count))]
-            found += [(loss(ratio), ratio, side) for ratio in chosen]
-    if not found:
+            candidates += [(loss(ratio), ratio, side) for ratio in chosen]
+    if not candidates:
         raise SynthesisError(
             'swing and time ratio', 'no crank-rocker has both', 'ask for a smaller swing or ratio'
         )
-    return [_build_design(task, ratio, side) for _, ratio, side in sorted(found)[:count]]
+    return [_build_design(task, ratio, side) for _, ratio, side in sorted(candidates)[:count]]
 
 
 def _dead_centre_places(

@@ -127,11 +127,13 @@ def assess(design: Design) -> Assessment:
     # With a single change point two turns may differ: the actual turns are proven.
     turns = tau * np.round((lift_directions(lengths, directions) - directions) / tau)
     moved = [
-        one._replace(crank=one.crank + float(by))
-        for one, by in zip(design.wanted, turns, strict=True)
+        position._replace(crank=position.crank + float(by))
+        for position, by in zip(design.wanted, turns, strict=True)
     ]
     met = prove(design._replace(wanted=tuple(moved)))
-    path = traverse_positions(lengths, directions, np.array([one.side == 'left' for one in met]))
+    path = traverse_positions(
+        lengths, directions, np.array([position.side == 'left' for position in met])
+    )
     defects = _find_defects(design, met, path)
     if defects:
         travel = None
@@ -162,7 +164,9 @@ def _find_defects(
     design: Design, met: tuple[AchievedPosition, ...], path: Traversal
 ) -> tuple[Defect, ...]:
     """Return the defects of a linkage; one that cannot be assembled hides all others."""
-    missed = [(number, one.gap) for number, one in enumerate(met, 1) if not one.is_closed]
+    missed = [
+        (number, position.gap) for number, position in enumerate(met, 1) if not position.is_closed
+    ]
     if missed:
         worst = max(gap for _, gap in missed)
         return (
@@ -198,7 +202,7 @@ def _branch_defect(design: Design, met: tuple[AchievedPosition, ...]) -> Defect:
                 for singular in closure.singular_inputs
                 if abs(remainder(singular.value - middle, tau)) <= half + SAME
             ]
-    where = ' and '.join(sorted({_degrees_text(remainder(one, tau)) for one in between}))
+    where = ' and '.join(sorted({_degrees_text(remainder(angle, tau)) for angle in between}))
     return Defect(
         'branch',
         f'{_sides_text(met)}; they meet only where coupler and rocker are in line, at crank '
@@ -212,8 +216,8 @@ def _circuit_defect(met: tuple[AchievedPosition, ...], path: Traversal) -> Defec
         where = _sides_text(met)
     else:
         upper = np.sin(path.directions) >= 0.0
-        one, other = (_positions_text(np.flatnonzero(upper == end) + 1) for end in (True, False))
-        where = f'the crank moves in two ranges, with {one} in one and {other} in the other'
+        here, there = (_positions_text(np.flatnonzero(upper == end) + 1) for end in (True, False))
+        where = f'the crank moves in two ranges, with {here} in one and {there} in the other'
     return Defect('circuit', f'{where}; only taking it apart leads from one to the other')
 
 
@@ -228,7 +232,7 @@ def _order_defect(design: Design, path: Traversal) -> Defect:
 
 def _sides_text(met: tuple[AchievedPosition, ...]) -> str:
     left, right = (
-        _positions_text(number for number, one in enumerate(met, 1) if one.side == side)
+        _positions_text(number for number, position in enumerate(met, 1) if position.side == side)
         for side in ('left', 'right')
     )
     return f'{left} on the left assembly, {right} on the right one'

@@ -115,9 +115,9 @@ def _turn_by(along: Twofold, across: Twofold, rest: Array, low: Array) -> Twofol
     sine = rest * square * (-1 / 6 + square * (1 / 120 - square * (1 / 5040)))
     cosine = square * (-0.5 + square * (1 / 24 - square * (1 / 720)))
     product, error = two_product(across[0], rest)
-    total, other = two_sum(along[0], product)
+    total, product_error = two_sum(along[0], product)
     tail = across[0] * (low + sine) + along[0] * cosine + across[1] * rest + along[1]
-    return _normalize(total, tail + error + other)
+    return _normalize(total, tail + error + product_error)
 
 
 def _normalize(high: Array, low: Array) -> Twofold:

@@ -94,15 +94,15 @@ def check_task(poses: Sequence[Pose], pivots: Mapping[str, complex]) -> None:
             raise SynthesisError(
                 name, f'({place.real}, {place.imag}) is not a place', 'give numbers'
             )
-    spread = max(abs(one.place - other.place) for one, other in combinations(poses, 2))
-    for (i, one), (j, other) in combinations(enumerate(poses, 1), 2):
+    spread = max(abs(first.place - second.place) for first, second in combinations(poses, 2))
+    for (i, first), (j, second) in combinations(enumerate(poses, 1), 2):
         if (
-            abs(remainder(one.angle - other.angle, tau)) < SAME
-            and abs(one.place - other.place) <= SAME * spread
+            abs(remainder(first.angle - second.angle, tau)) < SAME
+            and abs(first.place - second.place) <= SAME * spread
         ):
             raise SynthesisError(
                 f'poses {i} and {j}',
-                f'are the same, {place_text(one.place)} at {degrees(one.angle):.10g}°',
+                f'are the same, {place_text(first.place)} at {degrees(first.angle):.10g}°',
                 'give each pose once',
             )
     (name, place), (other_name, other_place) = pivots.items()
@@ -156,7 +156,7 @@ def circle_through(places: Place) -> PoleCircle:
     return PoleCircle(to_complex(centre), np.stack(spokes, -1), chords, pull)
 
 
-def centre_sensitivity(found: PoleCircle, own: Complex, shared: Complex) -> Array:
+def centre_sensitivity(circle: PoleCircle, own: Complex, shared: Complex) -> Array:
     """
     Return Σ|x·∂c/∂x| + ``abs(c)`` of the centre c over all inputs x; (…).
 
@@ -165,10 +165,10 @@ def centre_sensitivity(found: PoleCircle, own: Complex, shared: Complex) -> Arra
     by the inputs that move all three, (…, 3, m).
     """
     with np.errstate(all='ignore'):
-        back = np.conj(found.spokes)[..., None]
-        alone = np.abs(found.centre_derivatives)[..., None] * np.abs((back * own).real)
-        together = np.abs((found.centre_derivatives[..., None] * (back * shared).real).sum(-2))
-        total: Array = alone.sum((-2, -1)) + together.sum(-1) + np.abs(found.centre)
+        back = np.conj(circle.spokes)[..., None]
+        alone = np.abs(circle.centre_derivatives)[..., None] * np.abs((back * own).real)
+        together = np.abs((circle.centre_derivatives[..., None] * (back * shared).real).sum(-2))
+        total: Array = alone.sum((-2, -1)) + together.sum(-1) + np.abs(circle.centre)
     return total
 
 
@@ -184,8 +184,8 @@ def _place_at(places: Place, index: int) -> Place:
     return (x[..., index], x_low[..., index]), (y[..., index], y_low[..., index])
 
 
-def _subtract_places(one: Place, other: Place) -> Place:
-    return subtract(one[0], other[0]), subtract(one[1], other[1])
+def _subtract_places(first: Place, second: Place) -> Place:
+    return subtract(first[0], second[0]), subtract(first[1], second[1])
 
 
 class MotionLinks(NamedTuple):
@@ -388,9 +388,9 @@ def _check_link(
 
 def _check_distance(links: MotionLinks, names: str, kind: str, link: str) -> None:
     """Refuse two links that meet in the computed pivot."""
-    one, other = (complex(pivot) for pivot in links.pivots)
+    first, second = (complex(pivot) for pivot in links.pivots)
     size = TRUSTED * float(links.sensitivity.sum()) + 4.0 * float(links.lengths.max())
-    if abs(one - other) <= UNIT_ROUNDOFF * size:
+    if abs(first - second) <= UNIT_ROUNDOFF * size:
         raise SynthesisError(
             names,
             f'have the same {kind} pivot, since the coupler only turns about it: the {link} '

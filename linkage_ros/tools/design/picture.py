@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-A picture of a designed four-bar: its positions, and beside it its rocker's angle.
+A picture of a designed four-bar: its positions, and next to it its rocker's angle.
 
 The first position is drawn as an engineer draws it, the others as lines behind it, each in the
 assembly that meets it. Wanted values are blue. A short link is drawn again, enlarged.
@@ -83,21 +83,21 @@ def paint_wanted(axes: Any, design: Design, shown: Sequence[DesignPose], picture
     pale = {'color': WANTED, 'alpha': 0.3, 'linewidth': 3.5, 'zorder': 0.5}
     rays = 'wanted rocker angle φ' + _zero_note(four_bar.rocker, 'its pin at φ')
     places, frames = 'wanted place of P', 'wanted pose at P (long: x axis)'
-    for one in design.wanted:
-        if one.rocker is not None:
-            end = pivot + _wanted_ray(four_bar, one.rocker, picture)
+    for wanted in design.wanted:
+        if wanted.rocker is not None:
+            end = pivot + _wanted_ray(four_bar, wanted.rocker, picture)
             plot_places(axes, (pivot, end), label=rays, **pale)
             rays = ''
-        if one.place is not None and one.coupler is None:
+        if wanted.place is not None and wanted.coupler is None:
             plot_places(
-                axes, [one.place], linestyle='', marker='x', markersize=6.0, markeredgewidth=1.5,
-                color=WANTED, zorder=LAYERS['label'], label=places,
+                axes, [wanted.place], linestyle='', marker='x', markersize=6.0,
+                markeredgewidth=1.5, color=WANTED, zorder=LAYERS['label'], label=places,
             )  # fmt: skip
             places = ''
-        if one.place is not None and one.coupler is not None:
-            for end in _axes_of(one.place, one.coupler, picture):
+        if wanted.place is not None and wanted.coupler is not None:
+            for end in _axes_of(wanted.place, wanted.coupler, picture):
                 axes.annotate(
-                    '', (end.real, end.imag), (one.place.real, one.place.imag),
+                    '', (end.real, end.imag), (wanted.place.real, wanted.place.imag),
                     arrowprops={
                         'arrowstyle': '-|>', 'color': WANTED, 'linewidth': 1.3,
                         'shrinkA': 0.0, 'shrinkB': 0.0, 'mutation_scale': 7.0,
@@ -115,9 +115,9 @@ def arrow_ends(design: Design, picture: float) -> list[complex]:
     """Return the ends of the axes of wanted poses."""
     return [
         end
-        for one in design.wanted
-        if one.place is not None and one.coupler is not None
-        for end in _axes_of(one.place, one.coupler, picture)
+        for wanted in design.wanted
+        if wanted.place is not None and wanted.coupler is not None
+        for end in _axes_of(wanted.place, wanted.coupler, picture)
     ]
 
 
@@ -212,14 +212,14 @@ def write_numbers(
             names.add_name(str(pose.number), (pin,), clear, **style)
     picture = abs(complex(*(axes.viewLim.max - axes.viewLim.min)))
     blue = {'fontsize': 7.0, 'color': WANTED}
-    for number, one in enumerate(design.wanted, 1):
+    for number, wanted in enumerate(design.wanted, 1):
         if not is_numbered(number, count):
             continue
-        if one.rocker is not None:
-            end = design.four_bar.pivots[1] + _wanted_ray(design.four_bar, one.rocker, picture)
-            names.add_name(f'{degrees(one.rocker):.4g}°'.replace('-', '−'), (end,), 2.0, **blue)
-        if one.place is not None:
-            names.add_name(str(number), (one.place,), 5.0, **blue)
+        if wanted.rocker is not None:
+            end = design.four_bar.pivots[1] + _wanted_ray(design.four_bar, wanted.rocker, picture)
+            names.add_name(f'{degrees(wanted.rocker):.4g}°'.replace('-', '−'), (end,), 2.0, **blue)
+        if wanted.place is not None:
+            names.add_name(str(number), (wanted.place,), 5.0, **blue)
     lines = [
         shape_outline(shape)
         for shape in draw_shapes(drawn[0].closure, drawn[0].position, size, {})
@@ -259,8 +259,8 @@ def _link_ends(pose: DesignPose, link: str) -> dict[str, complex]:
 
 
 def _link_length(pose: DesignPose, link: str) -> float:
-    one, other = _link_ends(pose, link).values()
-    return abs(other - one)
+    start, end = _link_ends(pose, link).values()
+    return abs(end - start)
 
 
 def draw_design(
@@ -336,7 +336,7 @@ def _drawing_corners(
 ) -> tuple[complex, complex]:
     """Return the corners of the drawing, in [m]."""
     places = [place for pose in drawn for place in pose.points.values()]
-    places += [one.place for one in design.wanted if one.place is not None]
+    places += [wanted.place for wanted in design.wanted if wanted.place is not None]
     places += [place for way in ways if way.own for place in way.trace]
     low, high = bounding_corners(places)
     places += arrow_ends(design, 1.15 * abs(high - low))
@@ -360,7 +360,7 @@ def _paint_beside(
     shown: Sequence[DesignPose],
     error: tuple[ArrayLike, ArrayLike] | None,
 ) -> Any:
-    """Paint the plots beside the linkage, and return the upper axes."""
+    """Paint the plots next to the linkage, and return the upper axes."""
     places = misses_places(shown)
     if error is None and not places:
         above = figure.add_subplot(right)

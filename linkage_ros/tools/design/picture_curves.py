@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The plots beside a design: a link's angle over the crank's, and below it the errors."""
+"""The plots next to a design: a link's angle over the crank's, and below it the errors."""
 
 from __future__ import annotations
 

@@ -81,10 +81,10 @@ def mobility(lengths: Array) -> Mobility:
     excess = (ordered[..., 1] - shortest) - (ordered[..., 3] - ordered[..., 2])
     rounding = _rounding_error(lengths)
     excess = np.where(np.abs(excess) <= rounding, 0.0, excess)
-    beside = np.minimum(lengths[..., 0], lengths[..., 3])
+    turning = np.minimum(lengths[..., 0], lengths[..., 3])
     # The crank turns fully if crank or ground is shortest. Two shortest links occur only at a
     # change point, and there either may turn.
-    return Mobility(excess, (excess >= 0.0) & (beside - shortest <= rounding))
+    return Mobility(excess, (excess >= 0.0) & (turning - shortest <= rounding))
 
 
 def traverse_positions(lengths: Array, directions: Array, left: Flags) -> Traversal:
@@ -238,7 +238,10 @@ def assemble(design: Design) -> Design:
     """Return a design on the assembly that meets most positions; on a tie, the first one's."""
     size = sum(design.four_bar.lengths)
     left, right = prove_both_sides(design)
-    better = [_better_side(one, other, size) for one, other in zip(left, right, strict=True)]
+    better = [
+        _better_side(to_left, to_right, size)
+        for to_left, to_right in zip(left, right, strict=True)
+    ]
     votes = [side for side in better if side]
 
     def assembly_rank(side: Assembly) -> tuple[int, bool, float]:
@@ -299,10 +302,10 @@ def closed_position(closure: PlanarClosure, crank: float) -> Position:
 
 def _better_side(left: AchievedPosition, right: AchievedPosition, size: float) -> Assembly | None:
     """Return the assembly that meets a position markedly better, or None."""
-    one, other = _length_error(left, size), _length_error(right, size)
-    if other > _MARKEDLY * one + SAME * size:
+    left_error, right_error = _length_error(left, size), _length_error(right, size)
+    if right_error > _MARKEDLY * left_error + SAME * size:
         return 'left'
-    return 'right' if one > _MARKEDLY * other + SAME * size else None
+    return 'right' if left_error > _MARKEDLY * right_error + SAME * size else None
 
 
 def _length_error(met: AchievedPosition, size: float) -> float:

@@ -141,6 +141,6 @@ def _search_part(problem: Problem, seed: int, keep: int, part: _StudyPart) -> _B
 
 
 def _merge_best(parts: tuple[_Best, ...], keep: int) -> _Best:
-    scores, places, candidates = (np.concatenate(each) for each in zip(*parts, strict=True))
+    scores, places, candidates = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     order = np.lexsort((places, scores))[:keep]
     return _Best(scores[order], places[order], candidates[order])

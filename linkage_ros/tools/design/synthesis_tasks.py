@@ -117,9 +117,11 @@ def _of_pairs(
     if count == 3 and free:
         return _search_answers(crank, rocker, ground, search)
     if count == 3:
-        design, found = exact_four_bar(crank, rocker, ground)
+        design, solution = exact_four_bar(crank, rocker, ground)
         return [
-            DesignAnswer('three pairs, exact', design, assess(design), list(_pairs_facts(found)))
+            DesignAnswer(
+                'three pairs, exact', design, assess(design), list(_pairs_facts(solution))
+            )
         ]
     if count <= 5 and free:
         return _with_zeros(crank, rocker, ground)
@@ -176,19 +178,20 @@ def _with_zeros(crank: Angles, rocker: Angles, ground: float) -> list[DesignAnsw
     from linkage_ros.tools.design.pairs.free_zeros import five_pairs, four_pairs
 
     solve, what = (four_pairs, 'four pairs') if len(crank) == 4 else (five_pairs, 'five pairs')
-    found = []
-    for one in solve(crank, rocker, ground):
-        answer = _turned_answer(what, one.design)
+    answers = []
+    for solution in solve(crank, rocker, ground):
+        answer = _turned_answer(what, solution.design)
         digits = [
-            f'{link} {value:.0f}' for link, value in zip(_LINKS, one.reliable_digits, strict=True)
+            f'{link} {value:.0f}'
+            for link, value in zip(_LINKS, solution.reliable_digits, strict=True)
         ]
         facts = [
-            ('found', str(one.solution_counts)),
-            ('condition', f'{one.condition:.4g}'),
+            ('found', str(solution.solution_counts)),
+            ('condition', f'{solution.condition:.4g}'),
             ('digits to trust', ', '.join(digits)),
         ]
-        found.append(answer._replace(facts=facts))
-    return sorted(found, key=_rank_answer)
+        answers.append(answer._replace(facts=facts))
+    return sorted(answers, key=_rank_answer)
 
 
 def _rank_answer(answer: DesignAnswer) -> tuple[int, float]:
@@ -207,18 +210,19 @@ def _fit_answer(crank: Angles, rocker: Angles, ground: float, free: bool) -> Des
         ('rocker off, fitted', _errors_text(met)),
     ]
     return answer._replace(
-        facts=facts, curve=([one.crank for one in design.wanted], [one.angle for one in met])
+        facts=facts,
+        curve=([wanted.crank for wanted in design.wanted], [position.angle for position in met]),
     )
 
 
 def _errors_text(met: Sequence[AchievedPosition]) -> str:
-    closed = [one.angle for one in met if one.is_closed]
+    closed = [position.angle for position in met if position.is_closed]
     if not closed:
         return 'no position can be assembled'
     rms, most = hypot(*closed) / len(closed) ** 0.5, max(map(abs, closed))
     missed = len(met) - len(closed)
-    beside = f'; {missed} position(s) cannot be assembled' if missed else ''
-    return f'{degrees(rms):.4g}° rms, {degrees(most):.4g}° at most{beside}'
+    unassembled = f'; {missed} position(s) cannot be assembled' if missed else ''
+    return f'{degrees(rms):.4g}° rms, {degrees(most):.4g}° at most{unassembled}'
 
 
 def _solve_function(typed: argparse.Namespace, search: DesignSearch) -> list[DesignAnswer]:
@@ -243,15 +247,15 @@ def _solve_function(typed: argparse.Namespace, search: DesignSearch) -> list[Des
     )
     low, high = typed.range
     points = typed.at or chebyshev_points(low, high, typed.points)
-    found = []
+    answers = []
     for answer in _of_pairs(*angle_pairs(task, points), typed=typed, search=search):
         error = structural_error(
             answer.design, lambda angles: wanted_rocker(task, angles), *task.crank_range
         )
         facts = list(_structural_facts(task, error))
         curve = list(error.crank), list(error.error)
-        found.append(answer._replace(facts=[*answer.facts, *facts], curve=curve))
-    return found
+        answers.append(answer._replace(facts=[*answer.facts, *facts], curve=curve))
+    return answers
 
 
 def _structural_facts(task: FunctionTask, error: StructuralError) -> Iterator[tuple[str, str]]:
@@ -300,11 +304,11 @@ def _solve_path(typed: argparse.Namespace, search: DesignSearch) -> list[DesignA
     return [
         DesignAnswer(
             f'{len(rows)} points of a curve',
-            one.design,
-            assess(one.design),
-            [('points off', f'{one.rms:.4g} m rms, {one.greatest:.4g} m at most')],
+            result.design,
+            assess(result.design),
+            [('points off', f'{result.rms:.4g} m rms, {result.greatest:.4g} m at most')],
         )
-        for one in paths.found or paths.refused
+        for result in paths.found or paths.refused
     ]
 
 
@@ -341,15 +345,15 @@ def _solve_motion(typed: argparse.Namespace, _search: DesignSearch) -> list[Desi
     poses = [Pose(complex(x, y), typed.angles.to_radians(angle)) for x, y, angle in typed.pose]
     solve = from_fixed_pivots if fixed else from_moving_pivots
     design, links = solve(poses, *pivots)
-    (one, one_digits), (other, other_digits) = (
+    (first, first_digits), (second, second_digits) = (
         (f'({pivot.real:.10g}, {pivot.imag:.10g})', f'{digits:.0f}')
         for pivot, digits in zip(
             links.pivots.tolist(), links.reliable_digits.tolist(), strict=True
         )
     )
-    found = ('O2 and O4 in the ground', 'A and B in the coupler')[bool(fixed)]
+    computed = ('O2 and O4 in the ground', 'A and B in the coupler')[bool(fixed)]
     facts = [
-        (found, f'{one} and {other} m'),
-        ('digits to trust', f'{one_digits} and {other_digits}'),
+        (computed, f'{first} and {second} m'),
+        ('digits to trust', f'{first_digits} and {second_digits}'),
     ]
     return [DesignAnswer(f'three poses, from {kind} pivots', design, assess(design), facts)]

@@ -84,10 +84,10 @@ _LINK = (Column('link', 'link'), Column('>length', 'length_m', 'm', '.10g'), Col
 def _position_columns(answer: DesignAnswer, units: DisplayUnits) -> list[Column]:
     """Return the columns of positions; optional ones only if they were asked for."""
     rocker, coupler, place = (
-        any(getattr(one, what) is not None for one in answer.design.wanted)
+        any(getattr(position, what) is not None for position in answer.design.wanted)
         for what in ('rocker', 'coupler', 'place')
     )
-    found = (
+    columns = (
         (True, Column('>', 'position')),
         (True, Column('>crank', 'crank', 'rad', _angle_text)),
         (place, Column('>x', 'x_m', 'm', '.6g')),
@@ -99,7 +99,7 @@ def _position_columns(answer: DesignAnswer, units: DisplayUnits) -> list[Column]
         (rocker or coupler,
          Column(f'>off [{units.angle}]', 'off_angle', 'rad', _small_angle_text)),
     )  # fmt: skip
-    return [column for is_wanted, column in found if is_wanted]
+    return [column for is_wanted, column in columns if is_wanted]
 
 
 def _link_rows(four_bar: FourBar) -> Iterator[dict[str, Any]]:
@@ -115,14 +115,14 @@ def _link_rows(four_bar: FourBar) -> Iterator[dict[str, Any]]:
 def _position_rows(answer: DesignAnswer) -> Iterator[dict[str, Any]]:
     """Yield how each position is met."""
     pairs = zip(answer.design.wanted, answer.assessment.met, strict=True)
-    for number, (one, met) in enumerate(pairs, 1):
+    for number, (wanted, met) in enumerate(pairs, 1):
         yield {
             'position': number,
-            'crank': one.crank,
-            'x_m': None if one.place is None else one.place.real,
-            'y_m': None if one.place is None else one.place.imag,
-            'rocker': one.rocker,
-            'coupler': one.coupler,
+            'crank': wanted.crank,
+            'x_m': None if wanted.place is None else wanted.place.real,
+            'y_m': None if wanted.place is None else wanted.place.imag,
+            'rocker': wanted.rocker,
+            'coupler': wanted.coupler,
             'assembly': met.side if met.is_closed else f'open by {met.gap:.3g} m',
             'off_m': finite_or_none(met.distance) if met.is_closed else None,
             'off_angle': finite_or_none(met.angle) if met.is_closed else None,
@@ -131,7 +131,7 @@ def _position_rows(answer: DesignAnswer) -> Iterator[dict[str, Any]]:
 
 def _solution_json(answer: DesignAnswer, needs: Needs, units: DisplayUnits) -> dict[str, Any]:
     """Return a solution as JSON holds it; angles in [rad], texts as they are printed."""
-    found = answer.assessment
+    assessment = answer.assessment
     return {
         'title': units.convert_text(answer.title),
         'links': [*_link_rows(answer.design.four_bar)],
@@ -140,15 +140,16 @@ def _solution_json(answer: DesignAnswer, needs: Needs, units: DisplayUnits) -> d
             for name, value in answer.facts
         ],
         'positions': [*_position_rows(answer)],
-        'kind': found.kind.name,
-        'crank_turns': found.turns,
-        'travel': found.travel and list(found.travel),
-        'least_transmission': finite_or_none(found.transmission),
-        'link_ratio': finite_or_none(found.link_ratio),
+        'kind': assessment.kind.name,
+        'crank_turns': assessment.turns,
+        'travel': assessment.travel and list(assessment.travel),
+        'least_transmission': finite_or_none(assessment.transmission),
+        'link_ratio': finite_or_none(assessment.link_ratio),
         'defects': [
-            {'name': one.name, 'text': units.convert_text(one.text)} for one in found.defects
+            {'name': defect.name, 'text': units.convert_text(defect.text)}
+            for defect in assessment.defects
         ],
-        'missing': [units.convert_text(missed) for missed in unmet_needs(found, needs)],
+        'missing': [units.convert_text(missed) for missed in unmet_needs(assessment, needs)],
     }
 
 
@@ -353,16 +354,16 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 def _run_design(arguments: argparse.Namespace) -> int:
     with show_progress('candidates') as advance:
-        found, meeting = find_solutions(arguments, advance)
+        answers, meeting = find_solutions(arguments, advance)
     if arguments.ground > _LONG_GROUND:
         told = f'--ground: {arguments.ground:g} m is long; if it is in millimetres, divide by 1000'
         print(f'linkage synthesize: note: {told}', file=sys.stderr)
     needs, units = needs_of(arguments), arguments.angles
-    shown = found[: arguments.best]
+    shown = answers[: arguments.best]
     solutions = [_solution_json(answer, needs, units) for answer in shown]
     parts: list[Table | str] = []
     if not meeting:
-        parts.append(f'None of {len(found)} solution(s) has what is needed. Nearest to it:')
+        parts.append(f'None of {len(answers)} solution(s) has what is needed. Nearest to it:')
     for number, (answer, solution) in enumerate(zip(shown, solutions, strict=True), 1):
         title = answer.title if len(shown) == 1 else f'{number}: {answer.title}'
         parts += _solution_tables(answer, solution, title, needs, units)
@@ -384,13 +385,13 @@ def find_solutions(
     """Return the solutions that meet the requirements and True; or the nearest ones and False."""
     needs = needs_of(typed)
     keep = typed.best or _LISTED
-    found = find_answers(
+    answers = find_answers(
         typed, DesignSearch(needs, typed.seed, typed.candidates, keep, typed.dask, advance)
     )
-    meeting = [one for one in found if not unmet_needs(one.assessment, needs)]
+    meeting = [answer for answer in answers if not unmet_needs(answer.assessment, needs)]
     if meeting:
         return meeting, True
-    return sorted(found, key=lambda one: needs_penalty(one.assessment, needs)), False
+    return sorted(answers, key=lambda answer: needs_penalty(answer.assessment, needs)), False
 
 
 def needs_of(typed: argparse.Namespace) -> Needs:
@@ -424,9 +425,9 @@ def _write_solution(arguments: argparse.Namespace, shown: Sequence[DesignAnswer]
     answer = shown[arguments.pick - 1]
     first = answer.design.wanted[0].crank
     command = ' '.join(['linkage synthesize', *map(quote, sys.argv[2:])])
-    defects = [f'{one.name} defect: {one.text}' for one in answer.assessment.defects]
+    defects = [f'{defect.name} defect: {defect.text}' for defect in answer.assessment.defects]
     told = arguments.angles.convert_text
     lines = [told(f'Designed: {answer.title}'), command, *map(told, defects)]
     write_linkage(answer.design.four_bar.linkage(first), arguments.output, lines)
-    names = ' and '.join(one.name for one in answer.assessment.defects)
+    names = ' and '.join(defect.name for defect in answer.assessment.defects)
     print(f'{arguments.output}  ({names} defect: see above)' if names else arguments.output)

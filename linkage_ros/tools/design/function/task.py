@@ -145,7 +145,7 @@ def _find_jump(function: Expression, xs: Array, ys: Array) -> float | None:
             steps = np.abs(np.diff(ys))
         steepest = int(np.argmax(steps))
         largest.append(float(steps[steepest]))
-        # One step more on each side: a pole may lie beside the steepest step.
+        # One step more on each side: a pole may lie next to the steepest step.
         low, high = xs[max(steepest - 1, 0)], xs[min(steepest + 2, len(xs) - 1)]
         place = 0.5 * float(xs[steepest] + xs[steepest + 1])
         xs = np.linspace(low, high, _SAMPLES + 1)
@@ -409,7 +409,7 @@ def structural_error(
         )
 
     first, last = min(low, high), max(low, high)
-    precise = [one.crank for one in design.wanted if first <= one.crank <= last]
+    precise = [position.crank for position in design.wanted if first <= position.crank <= last]
     crank = np.unique(np.concatenate((np.linspace(first, last, _ERROR_SAMPLES + 1), precise)))
     if high < low:
         crank = crank[::-1]
@@ -440,8 +440,8 @@ def _greatest_error(
     highest = int(np.argmax(heights))
     if heights[highest] < 0.0:
         return nan, nan
-    beside = np.pad(heights, 1, constant_values=-1.0)
-    summits = np.flatnonzero((heights >= beside[:-2]) & (heights >= beside[2:]) & (heights >= 0.0))
+    padded = np.pad(heights, 1, constant_values=-1.0)
+    summits = np.flatnonzero((heights >= padded[:-2]) & (heights >= padded[2:]) & (heights >= 0.0))
     summits = summits[np.argsort(-heights[summits], kind='stable')[:_SUMMITS]]
     places, errors_at = [crank[highest]], [error[highest]]
     start = crank[np.maximum(summits - 1, 0)]

@@ -62,7 +62,7 @@ def nearest_four_bar(
     starts = [fit_equation(crank, rocker, ground), *_through_triples(crank, rocker, ground)]
     starts.sort(key=root_mean_square)
     fitted = [fit_angles(start, free_zeros=free_zeros) for start in starts[:_STARTS]]
-    return min(fitted, key=lambda one: (_is_open(one), root_mean_square(one)))
+    return min(fitted, key=lambda four_bar: (_is_open(four_bar), root_mean_square(four_bar)))
 
 
 def _is_open(design: Design) -> bool:
@@ -126,7 +126,9 @@ def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
         fitted = design._replace(four_bar=_change_design(start, best.x))
         candidates.append((root_mean_square(fitted), fitted))
     # A result that overflowed counts as the worst.
-    return min(candidates, key=lambda one: one[0] if isfinite(one[0]) else inf)[1]
+    return min(candidates, key=lambda candidate: candidate[0] if isfinite(candidate[0]) else inf)[
+        1
+    ]
 
 
 def root_mean_square(design: Design) -> float:

@@ -125,11 +125,11 @@ def equation_differences(crank: Sequence[float], rocker: Sequence[float]) -> Div
 def polish(rows: DividedDifferences, alpha: float, beta: float, moved: Moved) -> Solution | Lost:
     """Return the four-bar nearest to these zeros, or the reason why there is none."""
     columns = np.stack(_equation_columns(rows, alpha, beta), -1)
-    k1, k2, one = np.linalg.svd(columns * (1.0, 1.0, -1.0))[2][2]
-    if abs(one) * LONGEST <= max(abs(k1), abs(k2)):
+    k1, k2, scaling = np.linalg.svd(columns * (1.0, 1.0, -1.0))[2][2]
+    if abs(scaling) * LONGEST <= max(abs(k1), abs(k2)):
         return 'infinite'
     free = _UNKNOWNS[moved]
-    best = np.array([k1 / one, k2 / one, alpha, beta])
+    best = np.array([k1 / scaling, k2 / scaling, alpha, beta])
     least = _largest_residual(rows, best)
     for _ in range(_STEPS):
         tried = best.copy()
@@ -150,9 +150,9 @@ def polish(rows: DividedDifferences, alpha: float, beta: float, moved: Moved) ->
     return solution if np.all(lost < _VAGUE) else 'vague'
 
 
-def are_same(one: Solution, other: Solution) -> bool:
+def are_same(first: Solution, second: Solution) -> bool:
     """Return whether two differ only by rounding, as solutions near a double root may."""
-    (pins, lost), (others, lost_too) = _pin_places(one), _pin_places(other)
+    (pins, lost), (others, lost_too) = _pin_places(first), _pin_places(second)
     return bool(np.all(np.abs(pins - others) <= NOISE * UNIT_ROUNDOFF * (lost + lost_too)))
 
 
@@ -195,13 +195,13 @@ def _solve_links(
 
     By sums of two doubles: with a short coupler, crank and rocker cancel.
     """
-    (one,) = _as_twofold(np.ones(1))
+    (unit,) = _as_twofold(np.ones(1))
     parts = zip(_as_twofold(unknowns), _as_twofold(rest), strict=True)
     k1, k2, alpha, beta = (add(value, low) for value, low in parts)
-    a, c = divide(one, k1), divide((-one[0], one[1]), k2)
-    crank = [multiply(a, z) for z in sine_cosine(add((rows.theta[:1], one[1]), alpha))]
-    rocker = [multiply(c, z) for z in sine_cosine(add((rows.phi[:1], one[1]), beta))]
-    y, x = subtract(rocker[0], crank[0]), add(one, subtract(rocker[1], crank[1]))
+    a, c = divide(unit, k1), divide((-unit[0], unit[1]), k2)
+    crank = [multiply(a, z) for z in sine_cosine(add((rows.theta[:1], unit[1]), alpha))]
+    rocker = [multiply(c, z) for z in sine_cosine(add((rows.phi[:1], unit[1]), beta))]
+    y, x = subtract(rocker[0], crank[0]), add(unit, subtract(rocker[1], crank[1]))
     turned = [complex(x[0].item(), y[0].item()) for y, x in (crank, rocker, (y, x))]
     return a[0].item(), c[0].item(), turned[0], turned[1], turned[2]
 
@@ -417,8 +417,8 @@ def _real_rows(rows: DividedDifferences) -> Array:
     return np.stack([x for z in (rows.p, rows.q, rows.r) for x in (z.imag, z.real)], -1)
 
 
-def _triple_product(one: Array, other: Array, third: Array) -> float:
-    return float(np.dot(np.cross(one, other), third))
+def _triple_product(first: Array, second: Array, third: Array) -> float:
+    return float(np.dot(np.cross(first, second), third))
 
 
 def _form_roots(form: Array) -> Iterator[tuple[float, float]]:
@@ -463,10 +463,10 @@ def _list_solutions(
         else:
             candidates.append((moved, solution))
     # Of two equal ones, the less sensitive stays.
-    candidates.sort(key=lambda one: float(np.sum(one[1].sensitivity)))
+    candidates.sort(key=lambda candidate: float(np.sum(candidate[1].sensitivity)))
     four_bars: list[tuple[Moved, Solution]] = []
     for moved, solution in candidates:
-        if not any(are_same(solution, other) for _, other in four_bars):
+        if not any(are_same(solution, four_bar) for _, four_bar in four_bars):
             four_bars.append((moved, solution))
     among = Count(len(four_bars), *counts.values())
     if not four_bars:
@@ -476,7 +476,7 @@ def _list_solutions(
             f'no four-bar has all {len(rows.theta)} with {free} free: {among}',
             'move one of the angles, or leave the zeros as they are for the nearest four-bar',
         )
-    four_bars.sort(key=lambda one: (one[0] == 'crank', one[1].condition))
+    four_bars.sort(key=lambda four_bar: (four_bar[0] == 'crank', four_bar[1].condition))
     return tuple(
         _scale_solution(rows, moved, solution, among, ground) for moved, solution in four_bars
     )

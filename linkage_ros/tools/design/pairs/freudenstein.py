@@ -259,18 +259,20 @@ def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) 
                 f'{_pair_text(pair)} is not a pair of angles',
                 f'write two numbers of at most {degrees(_FARTHEST):.1g}°',
             )
-    for (i, one), (j, other) in combinations(pairs, 2):
-        theta, phi = (abs(remainder(u - v, tau)) for u, v in zip(one, other, strict=True))
+    for (i, first), (j, second) in combinations(pairs, 2):
+        theta, phi = (abs(remainder(u - v, tau)) for u, v in zip(first, second, strict=True))
         if theta < _SAME and phi < _SAME:
             raise SynthesisError(
-                f'pairs {i} and {j}', f'are the same, {_pair_text(one)}', 'give each position once'
+                f'pairs {i} and {j}',
+                f'are the same, {_pair_text(first)}',
+                'give each position once',
             )
         if theta < _SAME:
             raise SynthesisError(
                 f'pairs {i} and {j}',
-                f'want the rocker at {_degrees_text(one[1])} and at {_degrees_text(other[1])} '
+                f'want the rocker at {_degrees_text(first[1])} and at {_degrees_text(second[1])} '
                 'for the same '
-                f'crank angle, {_degrees_text(one[0])}, which needs both assemblies',
+                f'crank angle, {_degrees_text(first[0])}, which needs both assemblies',
                 'change one of the crank angles',
             )
 
@@ -296,11 +298,11 @@ def dependence_error(crank: Sequence[float], rocker: Sequence[float]) -> Synthes
             'turn crank and rocker by the same angles, as parallelograms of any crank length do',
             'change one, or draw a parallelogram',
         )
-    for (i, one), (j, other) in combinations(pairs, 2):
-        if all(abs(remainder(u + v, tau)) < _SAME for u, v in zip(one, other, strict=True)):
+    for (i, first), (j, second) in combinations(pairs, 2):
+        if all(abs(remainder(u + v, tau)) < _SAME for u, v in zip(first, second, strict=True)):
             return SynthesisError(
                 f'pairs {i} and {j}',
-                f'{_pair_text(one)} and {_pair_text(other)} are mirror images in the ground '
+                f'{_pair_text(first)} and {_pair_text(second)} are mirror images in the ground '
                 'line: a '
                 'four-bar that has one has the other',
                 'replace one of the pairs',

@@ -71,12 +71,12 @@ class ZeroProblem:
         An unmet need counts for more than that. Infinite without a four-bar, and for one with a
         defect.
         """
-        lengths, found, exists = self.courses(candidates)
-        ends = found.directions[:, 0], found.directions[:, -1]
+        lengths, courses, exists = self.courses(candidates)
+        ends = courses.directions[:, 0], courses.directions[:, -1]
         angle, _ = least_transmission(lengths, *ends)
         missed = needs_penalties(lengths, angle, self.needs)
         score = (90.0 - np.degrees(angle)) + _FAR * (missed + (missed > 0.0))
-        return np.where(exists & found.is_usable, score, np.inf)
+        return np.where(exists & courses.is_usable, score, np.inf)
 
     def courses(self, candidates: Array) -> tuple[Array, Traversal, Flags]:
         """
@@ -128,9 +128,11 @@ def search_zeros(
     check_pairs(crank, rocker, ground)
     needs.check()
     problem = ZeroProblem(tuple(crank), tuple(rocker), needs)
-    found = search(problem, seed=seed, count=count, keep=_POOL, progress=progress, address=address)
-    found = [one for one in found if isfinite(one.score)]
-    if not found:
+    designs = search(
+        problem, seed=seed, count=count, keep=_POOL, progress=progress, address=address
+    )
+    designs = [design for design in designs if isfinite(design.score)]
+    if not designs:
         pairs = ', '.join(
             f'{degrees(t):.6g}° → {degrees(p):.6g}°' for t, p in zip(crank, rocker, strict=True)
         )
@@ -140,8 +142,10 @@ def search_zeros(
             'try more zeros, or move an angle',
         )
     spacing = pi / count**0.5
-    best = [_polish(problem, one, spacing) for one in _distinct(found)[: 4 * keep]]
-    return tuple(_design(problem, one.candidate, ground) for one in _distinct(sorted(best))[:keep])
+    best = [_polish(problem, design, spacing) for design in _distinct(designs)[: 4 * keep]]
+    return tuple(
+        _design(problem, design.candidate, ground) for design in _distinct(sorted(best))[:keep]
+    )
 
 
 def _polish(problem: ZeroProblem, start: DesignFound, radius: float) -> DesignFound:
@@ -160,16 +164,16 @@ def _polish(problem: ZeroProblem, start: DesignFound, radius: float) -> DesignFo
     return best
 
 
-def _distinct(found: Sequence[DesignFound]) -> list[DesignFound]:
+def _distinct(designs: Sequence[DesignFound]) -> list[DesignFound]:
     """Return the best of candidates near each other, from a list with the best first."""
     kept: list[DesignFound] = []
-    for one in found:
-        alpha, beta = one.candidate
+    for design in designs:
+        alpha, beta = design.candidate
         if all(
             hypot(remainder(alpha - p, pi), remainder(beta - q, pi)) >= _APART
             for _, (p, q) in kept
         ):
-            kept.append(one)
+            kept.append(design)
     return kept
 
 

@@ -382,7 +382,7 @@ def generate_path(
             'times its size reaches the points',
             'allow longer links, or draw more',
         )
-    fitted = problem.place_candidates(np.array([one.candidate for one in drawn]))
+    fitted = problem.place_candidates(np.array([design.candidate for design in drawn]))
     for steps, guard, survivors in _STAGES:
         fitted, squares = improve(fitted, thin, steps, guard)
         fitted = fitted.select_rows(_distinct_indices(fitted, squares, max(survivors, 4 * keep)))
@@ -474,12 +474,12 @@ def _build_design(
 def _sort_paths(
     results: list[PathResult], keep: int, accept: Callable[[Design], bool] | None
 ) -> Paths:
-    found: list[PathResult] = []
+    accepted: list[PathResult] = []
     refused: list[PathResult] = []
     for result in results:
-        kind = found if accept is None or accept(result.design) else refused
+        kind = accepted if accept is None or accept(result.design) else refused
         if len(kind) < keep:
             kind.append(result)
-        if len(found) == keep:
+        if len(accepted) == keep:
             break
-    return Paths(tuple(found), tuple(refused))
+    return Paths(tuple(accepted), tuple(refused))
