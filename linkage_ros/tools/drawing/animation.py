@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-A moving picture of a linkage: its links, and beside them its joints with a mark at the instant.
+A moving picture of a linkage: its links, and next to them its joints with a mark at the instant.
 
 The shapes are made once, in one pose, and each moves with its link. A GIF and a video are painted
 picture by picture. An SVG is the first picture, whose shapes a style sheet moves, so that it needs
@@ -137,8 +137,8 @@ def check_kind(file: Path) -> None:
     """
     Check that files of a name can be written here.
 
-    A LinkageError is raised if it is no GIF, MP4 or SVG; matplotlib is missing, or ffmpeg for an
-    MP4.
+    A LinkageError is raised if it is none of GIF, MP4, SVG; if matplotlib is missing, or ffmpeg
+    for an MP4.
     """
     check_installed('matplotlib', "pip install 'linkage_ros[report]', or apt its package")
     check_output_name(file, ANIMATION_KINDS)
@@ -199,8 +199,8 @@ def _frames_of(shown: LinkageView) -> tuple[tuple[str, ...], Callable[[Position]
     moving = [link for link in frames_of_links(shown.closure, shown.position) if link != GROUND]
 
     def frames_at(position: Position) -> Any:
-        found = frames_of_links(shown.closure, position)
-        frames = [found[link] for link in moving]
+        frame_of = frames_of_links(shown.closure, position)
+        frames = [frame_of[link] for link in moving]
         return np.array([(place.real, place.imag, angle) for place, angle in frames])
 
     return tuple(moving), frames_at
@@ -414,7 +414,7 @@ class _SpatialShapes:
     def paint(self, plane: Any) -> None:
         """Paint the parts in the pose, the directions of the axes, and the curves."""
         self._plane, drawn = plane, self._drawn
-        # Beside the linkage, where nothing comes by.
+        # Next to the linkage, where nothing comes by.
         self.low -= 0.1 * (self.high - self.low)
         plane.set_xlim(self.low.real, self.high.real)
         plane.set_ylim(self.low.imag, self.high.imag)

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Draw a linkage in a pose, its range behind it, and beside it its joints over the input.
+Draw a linkage in a pose, its range behind it, and next to it its joints over the input.
 
 A spatial linkage is seen from a camera far away, with the z axis of its ground upward. Without
 --azimuth and --elevation it stands where places of the linkage hide each other least.
@@ -119,11 +119,11 @@ def add_camera(parser: argparse.ArgumentParser) -> None:
 
 def camera_of(arguments: argparse.Namespace, closure: Any) -> list[float | None]:
     """Return azimuth and elevation of the camera, in [rad]; a planar linkage has none."""
-    given = {option: getattr(arguments, option) for option in ('azimuth', 'elevation')}
-    for option, angle in given.items():
+    angles = {option: getattr(arguments, option) for option in ('azimuth', 'elevation')}
+    for option, angle in angles.items():
         if angle is not None and not isinstance(closure, SpaceClosure):
             raise LinkageError(f'--{option}', 'is of a spatial linkage', 'leave it out')
-    return [None if angle is None else radians(angle) for angle in given.values()]
+    return [None if angle is None else radians(angle) for angle in angles.values()]
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
@@ -168,8 +168,8 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 def _check_reach(arguments: argparse.Namespace) -> None:
     """Refuse what says nothing of a picture of joints instead of links."""
     for option in ('at', 'names', 'assemblies', 'azimuth', 'elevation'):
-        given = getattr(arguments, option)
-        if given or isinstance(given, float):
+        value = getattr(arguments, option)
+        if value or isinstance(value, float):
             raise LinkageError(f'--{option}', 'says nothing with --reach', 'leave one of them out')
     if arguments.output and arguments.output.suffix.lower() == '.dxf':
         file = arguments.output.with_suffix('.svg')
@@ -186,25 +186,29 @@ def _draw_reach(closure: Closure, arguments: argparse.Namespace, units: DisplayU
 
 def _draw_assemblies(arguments: argparse.Namespace, content: Section) -> int:
     """Draw all assemblies at the same inputs; one that is open there, at inputs of its own."""
-    found = list(find_closures(content, Path(arguments.file).stem).values())
-    first = found[0]
+    closures = list(find_closures(content, Path(arguments.file).stem).values())
+    first = closures[0]
     units = arguments.angles = DEGREES.of_file(content.units)
     if arguments.at:
         pose = read_inputs(first.linkage, arguments.at[0], '--at', units)
-        closed = [each for each in found if each.position(*pose).joints]
+        closed = [closure for closure in closures if closure.position(*pose).joints]
         # If it closes in no assembly there, `prepare_view` says so.
-        views = [prepare_view(each, pose) for each in closed or [first]]
+        views = [prepare_view(closure, pose) for closure in closed or [first]]
     else:
         pose = usual_inputs(first)
         views = [
-            prepare_view(each, pose if each.position(*pose).joints else usual_inputs(each))
-            for each in found
+            prepare_view(
+                closure, pose if closure.position(*pose).joints else usual_inputs(closure)
+            )
+            for closure in closures
         ]
-    views = [each._replace(length=units.length) for each in views]
+    views = [view._replace(length=units.length) for view in views]
     file = output_or(arguments, Path(f'{Path(arguments.file).stem}.png'))
     texts = [
-        pose_text(one.closure.linkage, read_drawn_pose(one.closure, one.position), content.units)
-        for one in views
+        pose_text(
+            view.closure.linkage, read_drawn_pose(view.closure, view.position), content.units
+        )
+        for view in views
     ]
     assemblies_picture(dict(zip(texts, views, strict=True)), file)
     for text in texts:
@@ -248,8 +252,8 @@ def draw_reach(closure: Closure, file: Path, units: DisplayUnits) -> None:
         axes.set_title(picture_text(closure.name, 60), loc='left', fontsize=9)
         axes.set_xlabel(f'{picture_text(box.joints[0], 30)} [{units.name_unit(first)}]')
         axes.set_ylabel(f'{picture_text(box.joints[1], 30)} [{units.name_unit(second)}]')
-        given = zip(box.closure.input_names, box.limits, COLOURS, shown, strict=False)
-        for name, limits, colour, lines in given:
+        sweeps = zip(box.closure.input_names, box.limits, COLOURS, shown, strict=False)
+        for name, limits, colour, lines in sweeps:
             unit = unit_of[name]
             low, high = (units.convert(end, unit) for end in (limits.low, limits.high))
             text = f'{picture_text(name, 30)}: {low:.4g} to {high:.4g} {units.name_unit(unit)}'

@@ -87,9 +87,9 @@ def _planar_names(shown: LinkageView, drawn: Sequence[Shape]) -> Iterator[DrawnN
         if bodies:
             edge = bodies[-1].corners
             middle = sum(edge) / len(edge)
-        one, other = places[0], places[-1]
+        start, end = places[0], places[-1]
         apart = (0.35, 0.65, 0.25, 0.75) if len(places) > 1 else ()
-        anchors = [middle, *(one + (other - one) * part for part in apart)]
+        anchors = [middle, *(start + (end - start) * part for part in apart)]
         yield DrawnName(link, anchors, is_link=True, clear=1.1)
 
 

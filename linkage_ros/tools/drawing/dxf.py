@@ -80,7 +80,7 @@ def links_dxf(closure: PlanarClosure) -> bytes:
     place = 0j
     for index, (part, (low, _), size) in enumerate(zip(parts, boxes, sizes, strict=True)):
         if index % _ROW == 0:
-            tallest = max(each.imag for each in islice(sizes, index, index + _ROW))
+            tallest = max(size.imag for size in islice(sizes, index, index + _ROW))
             place = complex(0.0, place.imag - tallest - 2.0 * wide)
         _draw_part(space, part, place - low + margin, 0.0, wide, bore)
         text = space.add_text(dxf_text(part.name), height=wide / 3.0, dxfattribs={'layer': 'NAME'})

@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A picture of a linkage by matplotlib: a pose, and beside it its joints over the input."""
+"""A picture of a linkage by matplotlib: a pose, and next to it its joints over the input."""
 
 from __future__ import annotations
 
@@ -276,9 +276,9 @@ def label_joints(panels: Mapping[bool, Any], joints: Sequence[Curve], lines: Any
 
 def moved_input(shown: LinkageView) -> tuple[str, str]:
     """Return the name and the unit of the input that moves."""
-    given = shown.closure.linkage.inputs[0]
+    driven = shown.closure.linkage.inputs[0]
     held = ', the others held' if len(shown.inputs) > 1 else ''
-    return f'{picture_text(given.joint)}{held}', 'm' if given.slider else '°'
+    return f'{picture_text(driven.joint)}{held}', 'm' if driven.slider else '°'
 
 
 def label_across(axes: Any, name: str, unit: str, length: str = 'm') -> None:

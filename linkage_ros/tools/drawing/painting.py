@@ -55,7 +55,7 @@ LAYERS: dict[str, int] = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
 _STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
 
 _FONT_SIZE = 7.0
-"""Of names beside lines, in points."""
+"""Of names next to lines, in points."""
 STROKES = {
     'rail': (INK, 1.3),
     'hatch': (INK, 0.7),
@@ -72,7 +72,7 @@ _SETTINGS: Any = {
 
 
 class DrawnName(NamedTuple):
-    """A name to be written beside one of some places, the first the best."""
+    """A name to be written next to one of some places, the first the best."""
 
     text: str
     anchors: Sequence[complex]
@@ -143,7 +143,7 @@ def place_labels(
     for _ in range(_ROUNDS):
         for index, label in enumerate(labels):
             pairs = enumerate(zip(labels, placed, strict=True))
-            others = [pair for other, pair in pairs if other != index]
+            others = [pair for number, pair in pairs if number != index]
             placed[index] = _best_place(label, obstacles, frame, others)
     return placed
 
@@ -169,10 +169,10 @@ def _best_place(
                 cost = 0.6 * ring + 0.3 * rank + 0.01 * i
                 cost += 400.0 * sum(
                     _is_overlapping(
-                        centre, half_width, half_height, other.centre, 0.5 * box.width,
+                        centre, half_width, half_height, neighbour.centre, 0.5 * box.width,
                         0.5 * box.height,
                     )
-                    for box, other in others
+                    for box, neighbour in others
                 )  # fmt: skip
                 cost += 20.0 * _is_outside(centre, half_width, half_height, frame)
                 if best is None or cost < best[0]:
@@ -190,15 +190,17 @@ def _count_struck(
 ) -> int:
     """Count the labels that a leader strikes: others by this one's, and this one by others'."""
     struck = 0
-    for box, other in others:
-        for (leads, start), (beside, at) in (
-            ((label, placed), (box, other)),
-            ((box, other), (label, placed)),
+    for box, neighbour in others:
+        for (leads, start), (neighbour_box, at) in (
+            ((label, placed), (box, neighbour)),
+            ((box, neighbour), (label, placed)),
         ):
             if has_leader(leads, start):
                 line = _points_between(start.anchor, leader_end(leads, start))
                 struck += bool(
-                    _count_inside(at.centre, 0.5 * beside.width, 0.5 * beside.height, line)
+                    _count_inside(
+                        at.centre, 0.5 * neighbour_box.width, 0.5 * neighbour_box.height, line
+                    )
                 )
     return struck
 
@@ -213,11 +215,11 @@ def _is_overlapping(
     centre: complex,
     width: float,
     height: float,
-    other: complex,
+    other_centre: complex,
     its_width: float,
     its_height: float,
 ) -> bool:
-    apart = other - centre
+    apart = other_centre - centre
     return abs(apart.real) < width + its_width and abs(apart.imag) < height + its_height
 
 
@@ -274,15 +276,15 @@ def spread_places(places: Sequence[float], gap: float) -> list[float]:
             last = runs.pop()
             runs[-1] += last
     moved = [fmean(run) for run in runs for _ in run]
-    found = [0.0] * len(places)
+    spread = [0.0] * len(places)
     for rank, index in enumerate(order):
-        found[index] = moved[rank] + rank * gap
-    return found
+        spread[index] = moved[rank] + rank * gap
+    return spread
 
 
 def label_ends(axes: Any, lines: Sequence[Any]) -> None:
     """
-    Write the names of lines at their right ends, beside the axes.
+    Write the names of lines at their right ends, next to the axes.
 
     The axes' limits are final. The heights of the axes are from the last drawing.
     """
@@ -404,7 +406,7 @@ def make_faint(artist: Any, strength: float) -> None:
 
     for part in ('color',) if hasattr(artist, 'get_color') else ('facecolor', 'edgecolor'):
         *colour, opacity = to_rgba(getattr(artist, f'get_{part}')())
-        mixed = [1.0 - strength * (1.0 - each) for each in colour]
+        mixed = [1.0 - strength * (1.0 - channel) for channel in colour]
         getattr(artist, f'set_{part}')((*mixed, opacity))
 
 
@@ -493,8 +495,8 @@ class NameLabels:
 def has_leader(label: Label, placed: PlacedText) -> bool:
     """Return whether a label is so far from its anchor that a line has to lead to it."""
     away = placed.centre - placed.anchor
-    beside = max(abs(away.real) - 0.5 * label.width, abs(away.imag) - 0.5 * label.height)
-    return beside > label.clear + 0.4 * label.height
+    distance = max(abs(away.real) - 0.5 * label.width, abs(away.imag) - 0.5 * label.height)
+    return distance > label.clear + 0.4 * label.height
 
 
 def leader_end(label: Label, placed: PlacedText) -> complex:

@@ -228,7 +228,7 @@ def curves_over_time(
             name,
             isinstance(joint, RevoluteJoint),
             times,
-            np.array([each[place] if each else nan for each in rates]),
+            np.array([row[place] if row else nan for row in rates]),
             gaps,
         )
         for place, (name, joint) in enumerate(linkage.joints.items())
@@ -261,7 +261,7 @@ def crank_curves(
     driven = linkage.inputs[0]
     closure = Closure(linkage)
     input_sweep = InputSweep(closure, cranks[0])
-    about = (each for each in input_sweep.ranges if _is_within(cranks[0][0], each))
+    about = (interval for interval in input_sweep.ranges if _is_within(cranks[0][0], interval))
     interval = next(about, input_sweep.widest_range)
     ideal = sweep_range(input_sweep, interval).joints if interval else ()
     crank = np.array([inputs[0] for inputs in cranks])

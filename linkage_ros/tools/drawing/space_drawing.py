@@ -96,25 +96,27 @@ def choose_camera(
     azimuths = [*map(radians, _AZIMUTHS)] if azimuth is None else [azimuth]
     elevations = [*map(radians, _ELEVATIONS)] if elevation is None else [elevation]
     cameras = [Camera(a, e) for e in elevations for a in azimuths]
-    beside = [each for each in cameras if np.abs(axes @ each.axes[2]).max(initial=0.0) < _BESIDE]
+    oblique = [
+        camera for camera in cameras if np.abs(axes @ camera.axes[2]).max(initial=0.0) < _BESIDE
+    ]
 
     def length_seen(camera: Camera) -> float:
         seen = np.abs(camera.project(lines)[0]) + _SHORTEST * drawing.extent
         return float(np.log(seen).mean()) if len(lines) else 0.0
 
-    return max(beside or cameras, key=length_seen)
+    return max(oblique or cameras, key=length_seen)
 
 
 def space_page_data(drawing: SpaceDrawing, seen: Places) -> dict[str, Any]:
     """Return the drawing as JSON data; ``seen`` are its places at many positions."""
     middle = 0.5 * (seen.min(axis=(0, 1)) + seen.max(axis=(0, 1)))
     away = seen - middle
-    reach = [np.linalg.norm(each, axis=2).max() for each in (away[:, :, :2], away)]
+    reach = [np.linalg.norm(places, axis=2).max() for places in (away[:, :, :2], away)]
     return {
         'camera': choose_camera(drawing, seen[0]),
         'middle': middle.tolist(),
         # To the side and upward, from wherever it is seen.
-        'reach': [float(each) + 2.0 * drawing.size for each in reach],
+        'reach': [float(length) + 2.0 * drawing.size for length in reach],
         'size': drawing.size,
         'extent': drawing.extent,
         'has_lengths': drawing.has_lengths,
@@ -137,14 +139,16 @@ def projected_shapes(
     """Return shapes in the picture, the farthest first, each with its strength from 0 to 1."""
     seen, near = camera.project(places)
     depths = [float(np.mean(near[list(part.corners)])) for part in drawing.parts]
-    nearest, found = max(depths), []
+    nearest, painted = max(depths), []
     for i, part in enumerate(drawing.parts):
         # A rail is behind all.
-        order = max([depths[i], *(depths[other] for other in drawing.below(i))])
+        order = max([depths[i], *(depths[number] for number in drawing.below(i))])
         shape = _shape_of(part, [complex(seen[row]) for row in part.corners], drawing.size)
         strength = max(_FAINTEST, 1.0 - _FADING * (nearest - depths[i]) / drawing.extent)
-        found.append((part.role != 'rail', order, i, shape, strength))
-    return [(shape, strength) for *_, shape, strength in sorted(found, key=lambda each: each[:3])]
+        painted.append((part.role != 'rail', order, i, shape, strength))
+    return [
+        (shape, strength) for *_, shape, strength in sorted(painted, key=lambda entry: entry[:3])
+    ]
 
 
 def _shape_of(part: Part, corners: list[complex], size: float) -> Shape:
@@ -192,7 +196,7 @@ def draw_spatial(shown: LinkageView, angles: Sequence[float | None]) -> DrawnLin
         drawing.size,
         [shape for shape, _ in drawn],
         list(skeleton_of(drawing, places, camera)),
-        [list(skeleton_of(drawing, each, camera)) for each in behind],
+        [list(skeleton_of(drawing, places, camera)) for places in behind],
         paths,
         {name: complex(seen[drawing.points[name]]) for name in paths},
         list(_spatial_names(drawing, seen)),
@@ -211,8 +215,8 @@ def _spatial_names(drawing: SpaceDrawing, seen: Any) -> Iterator[DrawnName]:
         corners = [complex(seen[row]) for row in part.corners]
         anchors = [corners[len(corners) // 2], *corners[2:-2]]
         if len(corners) == 2:
-            (one, other), parts = corners, (0.5, 0.35, 0.65, 0.25, 0.75)
-            anchors = [one + (other - one) * part for part in parts]
+            (start, end), parts = corners, (0.5, 0.35, 0.65, 0.25, 0.75)
+            anchors = [start + (end - start) * part for part in parts]
         elif part.is_hull:
             anchors = [sum(corners) / len(corners)]
         yield DrawnName(part.name, anchors, is_link=True, clear=1.1)

@@ -34,7 +34,7 @@ class JointSpread(NamedTuple):
 
 def draw_spread(title: str, seconds: float, joints: Sequence[JointSpread], file: Path) -> None:
     """
-    Draw a study to a file: each joint, and beside it how far the runs are from their median.
+    Draw a study to a file: each joint, and next to it how far the runs are from their median.
 
     The suffix selects the format. A LinkageError says that matplotlib is not installed, or that
     the file cannot be written.
