@@ -138,8 +138,8 @@ def _write_source(arguments: argparse.Namespace, closure: Any, file: Path) -> in
 
 def _write_transmission(arguments: argparse.Namespace, closure: Any, file: Path) -> int:
     folder: Path = arguments.ros2_control
-    for option, given in (('-o', arguments.output), ('--arrays', arguments.arrays)):
-        if given:
+    for option, is_set in (('-o', arguments.output), ('--arrays', arguments.arrays)):
+        if is_set:
             remedy = f'leave out {option} or --ros2-control'
             raise LinkageError(option, 'is for one source', remedy)
     name = folder.resolve().name

@@ -120,10 +120,10 @@ def physical_tree(closure: PlanarClosure) -> PhysicalTree:
     part_of = {link: link for link in links}
     kept: list[_Edge] = []
     for edge in sorted(_list_edges(closure), key=lambda edge: edge.rank):
-        one, other = (part_of[end] for end in edge.ends)
-        if one != other:
+        part, joined = (part_of[end] for end in edge.ends)
+        if part != joined:
             kept.append(edge)
-            part_of = {link: one if part == other else part for link, part in part_of.items()}
+            part_of = {link: part if p == joined else p for link, p in part_of.items()}
     branches: list[TreeBranch] = []
     reached = [GROUND]
     for link in reached:
@@ -140,9 +140,12 @@ def physical_tree(closure: PlanarClosure) -> PhysicalTree:
 def _list_edges(closure: PlanarClosure) -> Iterator[_Edge]:
     """Yield pins between any two links, and sliders; those to keep in the tree rank first."""
     linkage, links = closure.linkage, closure.structure.links
-    driven = {frozenset((given.parent, given.child)) for given in linkage.driven_joints}
+    driven = {
+        frozenset((driven_joint.parent, driven_joint.child))
+        for driven_joint in linkage.driven_joints
+    }
     for name, slider in linkage.sliders.items():
-        is_input = any(given.slider == name for given in linkage.inputs)
+        is_input = any(driven_joint.slider == name for driven_joint in linkage.inputs)
         ends = (slider.along, closure.structure.blocks[name])
         yield _Edge(0 if is_input else 1, 'P', name, ends)
     published = {
@@ -150,12 +153,12 @@ def _list_edges(closure: PlanarClosure) -> Iterator[_Edge]:
         for joint in linkage.named_joints.values()
         if isinstance(joint, RevoluteJoint)
     }
-    for one, other in combinations(links, 2):
-        for pin in links[one]:
-            if pin in links[other]:
-                pair = frozenset((one, other))
+    for link, neighbour in combinations(links, 2):
+        for pin in links[link]:
+            if pin in links[neighbour]:
+                pair = frozenset((link, neighbour))
                 rank = 0 if pair in driven else 2 if pair in published else 3
-                yield _Edge(rank, 'R', pin, (one, other))
+                yield _Edge(rank, 'R', pin, (link, neighbour))
 
 
 def _find_cuts(closure: PlanarClosure, kept: list[_Edge]) -> Iterator[tuple[str, str, str]]:
@@ -163,10 +166,10 @@ def _find_cuts(closure: PlanarClosure, kept: list[_Edge]) -> Iterator[tuple[str,
         part_of = {link: link for link in carried}
         for edge in kept:
             if edge.kind == 'R' and edge.name == point:
-                one, other = (part_of[end] for end in edge.ends)
-                part_of = {link: one if p == other else p for link, p in part_of.items()}
+                part, joined = (part_of[end] for end in edge.ends)
+                part_of = {link: part if p == joined else p for link, p in part_of.items()}
         first, *others = dict.fromkeys(part_of[link] for link in carried)
-        yield from ((point, first, other) for other in others)
+        yield from ((point, first, link) for link in others)
 
 
 def _joint_name(closure: PlanarClosure, edge: _Edge, parent: str, child: str) -> tuple[str, int]:
@@ -199,7 +202,7 @@ class Bodies:
         self.inputs = usual_inputs(closure)  # Inputs at the start, in [rad] or [m]
         self._position = closure.position(*self.inputs)
         self._driven = dict(
-            zip((given.joint for given in closure.linkage.inputs), self.inputs, strict=True)
+            zip((driven.joint for driven in closure.linkage.inputs), self.inputs, strict=True)
         )
         self.welds: list[tuple[str, str]] = []  # In the plane there are none
         # Elements of the joints that have a name in messages, by that name.
@@ -263,8 +266,8 @@ class Bodies:
         place, turn, axis, origin = _pose_on_parent(closure, branch)
         self._origins[child] = origin
         place -= self._origins[branch.parent]
-        given = child in closure.linkage.links
-        name = self._names.own_name(child) if given else self._names.free_frame(child)
+        is_link = child in closure.linkage.links
+        name = self._names.own_name(child) if is_link else self._names.free_frame(child)
         value = self._joint_value(branch)
         if branch.kind == 'R':
             turn += branch.sign * value
@@ -288,7 +291,7 @@ class Bodies:
         joint.set('ref', format_number(value))
         self.start.append(value)
         mass = closure.linkage.masses.get(child)
-        solids = self._drawn[child] if given else _slot_block(closure, child)
+        solids = self._drawn[child] if is_link else _slot_block(closure, child)
         if mass is not None:
             _write_inertial(body, mass, origin)
         self._masses[child] = mass.mass if mass else _approximate_mass(solids)
@@ -470,12 +473,15 @@ def _write_connections(sections: Mapping[str, ET.Element], part: ModelPart, bodi
     links = links_by_point(linkage.links)
     for point in linkage.traced:
         bodies.site_name(links[point][0], point)
-    for point, one, other in bodies.cuts:
-        ends = {'site1': bodies.site_name(one, point), 'site2': bodies.site_name(other, point)}
+    for point, link, neighbour in bodies.cuts:
+        ends = {
+            'site1': bodies.site_name(link, point),
+            'site2': bodies.site_name(neighbour, point),
+        }
         name = f'{ends["site1"]} = {ends["site2"]}'
         ET.SubElement(sections['equality'], 'connect', {'name': name, **ends})
-    for one, other in bodies.welds:
-        ET.SubElement(sections['equality'], 'weld', body1=one, body2=other)
+    for body, neighbour in bodies.welds:
+        ET.SubElement(sections['equality'], 'weld', body1=body, body2=neighbour)
     for name, ratio in linkage.ratios.items():
         if ratio.also:
             raise PartError(
@@ -488,11 +494,11 @@ def _write_connections(sections: Mapping[str, ET.Element], part: ModelPart, bodi
                 'one of its two joints is cut, or lies between links without a common pin',
                 'publish the joint at a pin of the tree',
             )
-        one, other = (bodies.joints[joint].get('name', '') for joint in (name, ratio.of))
+        follower, leader = (bodies.joints[joint].get('name', '') for joint in (name, ratio.of))
         # The engine counts both from the pose as written, in which the ratio holds.
         coefficients = format_numbers(0.0, ratio.ratio, 0.0, 0.0, 0.0)
         ET.SubElement(
-            sections['equality'], 'joint', joint1=one, joint2=other, polycoef=coefficients
+            sections['equality'], 'joint', joint1=follower, joint2=leader, polycoef=coefficients
         )
     for spring in part.loads.springs if part.loads else ():
         tendon = ET.SubElement(
@@ -511,9 +517,9 @@ def _write_connections(sections: Mapping[str, ET.Element], part: ModelPart, bodi
 def _write_servos(actuators: ET.Element, part: ModelPart, bodies: Any) -> None:
     """Drive the inputs by servos whose stiffness suits the inertia that they move."""
     motor = part.loads.drive_inertia if part.loads else 0.0
-    for count, given in enumerate(part.closure.linkage.inputs):
+    for count, driven in enumerate(part.closure.linkage.inputs):
         inertia = bodies.input_inertia(count) + motor
-        joint = bodies.joints[given.joint]
+        joint = bodies.joints[driven.joint]
         if motor:
             joint.set('armature', format_number(motor))
         servo = ET.SubElement(
@@ -524,5 +530,5 @@ def _write_servos(actuators: ET.Element, part: ModelPart, bodies: Any) -> None:
             kp=format_rough(inertia * _PACE * _PACE),
             kv=format_rough(2.0 * inertia * _PACE),
         )
-        if given.limits.is_bounded:
+        if driven.limits.is_bounded:
             servo.set('ctrlrange', joint.get('range', ''))

@@ -71,9 +71,9 @@ class Orientations:
             if isinstance(joint, RevoluteJoint):
                 self._add_turn(joint.parent, joint.child, name, 0.0)
 
-    def _add_turn(self, one: str, other: str, joint: str, constant: float) -> None:
-        self._next[one].append((other, Turn(joint, 1, constant)))
-        self._next[other].append((one, Turn(joint, -1, -constant)))
+    def _add_turn(self, link: str, neighbour: str, joint: str, constant: float) -> None:
+        self._next[link].append((neighbour, Turn(joint, 1, constant)))
+        self._next[neighbour].append((link, Turn(joint, -1, -constant)))
 
     def angle_between(self, link: str, other: str) -> tuple[Turn, ...] | None:
         """
@@ -86,7 +86,7 @@ class Orientations:
     def known_from(self, link: str) -> Iterator[str]:
         """Yield the links whose angles relative to this one are known, in the linkage's order."""
         known = self._paths_from(link)
-        return (other for other in self._links if other in known)
+        return (link for link in self._links if link in known)
 
     def _paths_from(self, link: str) -> dict[str, tuple[Turn, ...]]:
         """Search from a link, fewest joints first; a constant does not count as a joint."""
@@ -98,11 +98,11 @@ class Orientations:
             if reached in paths:
                 continue
             paths[reached] = turns
-            for other, turn in self._next[reached]:
-                if other not in paths:
+            for neighbour, turn in self._next[reached]:
+                if neighbour not in paths:
                     count += 1
                     more = joints + bool(turn.joint)
-                    heappush(ahead, (more, count, other, (*turns, turn)))
+                    heappush(ahead, (more, count, neighbour, (*turns, turn)))
         return paths
 
 
@@ -138,12 +138,12 @@ def joint_spans(closure: PlanarClosure) -> dict[str, AngleSpan]:
     ranges = dict(
         zip(closure.linkage.joints, _published_spans(closure, start, interval), strict=True)
     )
-    (given,) = closure.linkage.inputs
+    (driven,) = closure.linkage.inputs
     margin = _MARGIN * (1.0 if interval.turning else closure.slide_bound)
     own = AngleSpan(interval.lowest - margin, interval.highest + margin)
     if interval.is_whole or (interval.turning and own.passes_pi):
         own = ROUND
-    ranges.setdefault(given.joint, own)
+    ranges.setdefault(driven.joint, own)
     return {name: ranges[name] for name in joints}
 
 
@@ -161,12 +161,12 @@ def _published_spans(
     closed = ~np.isnan(rows).any(axis=0)
     values, rows = values[closed], rows[:, closed]
     first = int(np.argmin(np.abs(values - start)))
-    found = []
+    spans = []
     for row, turning in zip(rows, closure.turning, strict=True):
-        found.append(
+        spans.append(
             _joint_span(np.unwrap(row) if turning else row, first, turning, closure, interval)
         )
-    return found
+    return spans
 
 
 def _joint_span(

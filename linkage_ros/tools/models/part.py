@@ -67,8 +67,8 @@ class ModelNames:
             linkage.pair_joints if isinstance(linkage, SpaceLinkage) else linkage.named_joints
         )
         links = linkage.link_names
-        for kind, taken, found in (('link', self._frames, links), ('joint', self._joints, joints)):
-            for name in found:
+        for kind, taken, names in (('link', self._frames, links), ('joint', self._joints, joints)):
+            for name in names:
                 if prefix + name in taken:
                     raise PartError(
                         self._count,
@@ -77,7 +77,7 @@ class ModelNames:
                         'give one of them another name',
                         of_linkage=False,
                     )
-            taken |= {prefix + name for name in found}
+            taken |= {prefix + name for name in names}
         self._count += 1
         return PrefixedNames(prefix, self)
 

@@ -84,22 +84,22 @@ class SpaceBodies:
         part_of = {link: link for link in self._linkage.link_names}
         kept, closing = dict[str, SpatialJoint](), dict[str, SpatialJoint]()
         joints = self._linkage.pair_joints.items()
-        for name, joint in sorted(joints, key=lambda each: each[0] not in self._linkage.driven):
-            one, other = part_of[joint.parent], part_of[joint.child]
-            if one == other:
+        for name, joint in sorted(joints, key=lambda entry: entry[0] not in self._linkage.driven):
+            part, joined = part_of[joint.parent], part_of[joint.child]
+            if part == joined:
                 closing[name] = joint
                 continue
             kept[name] = joint
-            part_of = {link: one if part == other else part for link, part in part_of.items()}
+            part_of = {link: part if p == joined else p for link, p in part_of.items()}
         return kept, closing
 
     def _balls(self) -> Iterator[tuple[str, str, str]]:
         """Yield the points that are cut, each with two links that it joins."""
         joined = set()
-        for point, one, other in self._linkage.shared_points(on_axes=False):
-            if (point, other) not in joined:
-                joined.add((point, other))
-                yield point, one, other
+        for point, link, neighbour in self._linkage.shared_points(on_axes=False):
+            if (point, neighbour) not in joined:
+                joined.add((point, neighbour))
+                yield point, link, neighbour
 
     def site_name(self, link: str, point: str) -> str:
         """Return the name of a site at a point of a link; make the site if it is missing."""
@@ -126,16 +126,16 @@ class SpaceBodies:
         else:
             return 0.0
         rates = np.square((self._drawing.places(there) - self._places) / step).sum(axis=1)
-        found = 0.0
+        inertia = 0.0
         for part in self._drawing.bodies:
             mass = self._masses.get(part.name, 0.0)
-            found += mass * float(np.mean(rates[list(part.corners)]))
-        return found
+            inertia += mass * float(np.mean(rates[list(part.corners)]))
+        return inertia
 
     def _hang_on(self, parent: str) -> None:
         """Write the children of a link, depth first, in the order of the engine's joints."""
-        while (found := self._next_joint(parent)) is not None:
-            chain = [found]
+        while (next_joint := self._next_joint(parent)) is not None:
+            chain = [next_joint]
             while self._is_passed(chain[-1][2]):
                 onward = self._next_joint(chain[-1][2])
                 assert onward is not None
@@ -175,7 +175,7 @@ class SpaceBodies:
 
     def _add_joint(self, link: str, name: str, joint: SpatialJoint, sign: float) -> None:
         slides = name in self._linkage.slides
-        axis = [sign * each for each in joint.axis]
+        axis = [sign * component for component in joint.axis]
         at = (0.0, 0.0, 0.0) if slides else minus(joint.at, self._origins[link])
         element = ET.SubElement(
             self._links[link],
@@ -235,18 +235,18 @@ class SpaceBodies:
         """Write a link as round bars between its places; return their mass in [kg]."""
         radius, total = 0.5 * self._drawing.size, 0.0
         for corners in self._corners(link):
-            for one, other in pairwise(corners):
-                ends = [minus(tuple(each), self._origins[link]) for each in (one, other)]
+            for start, end in pairwise(corners):
+                ends = [minus(tuple(corner), self._origins[link]) for corner in (start, end)]
                 place = format_rough(*ends[0], *ends[1])
                 size = format_rough(radius)
                 ET.SubElement(self._links[link], 'geom', type='capsule', fromto=place, size=size)
-                total += DENSITY * np.pi * radius**2 * float(np.linalg.norm(other - one))
+                total += DENSITY * np.pi * radius**2 * float(np.linalg.norm(end - start))
         return total
 
     def _strut_halves(self) -> Iterator[tuple[str, Any]]:
         """Yield tube and rod of each strut, with the places of its ends and its middle."""
-        for name, (one, other) in self._closure.linkage.struts.items():
-            ends = [self._places[self._drawing.points[point]] for point in (one, other)]
+        for name, (start, end) in self._closure.linkage.struts.items():
+            ends = [self._places[self._drawing.points[point]] for point in (start, end)]
             middle = self._places[self._drawing.joints[name]]
             slide = self._linkage.slides[name]
             yield slide.parent, np.array([ends[0], middle])

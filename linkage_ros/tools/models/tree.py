@@ -49,7 +49,7 @@ def suggest_joint(
             if link not in known:
                 return link, f'{link}_joint', RevoluteJoint(on, link)
         for name, slider in linkage.sliders.items():
-            ends = (slider.along, *(each for each in links if slider.point in links[each]))
+            ends = (slider.along, *(link for link in links if slider.point in links[link]))
             held = [end for end in ends if end in placed]
             if link in ends and held and (link == slider.along or slider.along in placed):
                 if link not in known:

@@ -256,7 +256,7 @@ def urdf_model(name: str, parts: Sequence[ModelPart]) -> bytes:
     robot = ET.Element('robot', name=name)
     robot.append(xml_comment(list(_head_lines(models))))
     linkages = [part.closure.linkage for part in parts]
-    planes = [one.axes if isinstance(one, Linkage) else _FLAT for one in linkages]
+    planes = [linkage.axes if isinstance(linkage, Linkage) else _FLAT for linkage in linkages]
     if len(models) > 1 or planes != [_FLAT]:
         root = names.free_frame(_ROOT)
         ET.SubElement(robot, 'link', name=root)
@@ -289,8 +289,8 @@ def _refuse_expressions(number: int, element: ET.Element, *, of_linkage: bool = 
     A launch file may read a URDF with or without xacro: a name that is escaped for one is a
     different name for the other.
     """
-    for each in element.iter():
-        for text in each.attrib.values():
+    for part in element.iter():
+        for text in part.attrib.values():
             if _EXPRESSION.search(text):
                 raise PartError(
                     number,
@@ -343,7 +343,7 @@ def _write_linkage(robot: ET.Element, model: _Model) -> None:
         if joint.child not in links:
             ET.SubElement(robot, 'link', name=joint.child)
     spans = {names.own_name(name): span for name, span in model.spans.items()}
-    given = {names.own_name(name): limits for name, limits in linkage.limits.items()}
+    limits_of = {names.own_name(name): limits for name, limits in linkage.limits.items()}
     computed: dict[str, dict[str, str]] = {}
     followed = {
         names.own_name(name): replace(mimic, of=names.own_name(mimic.of))
@@ -360,7 +360,7 @@ def _write_linkage(robot: ET.Element, model: _Model) -> None:
             (0.0, 0.0, joint.turn),
             (0.0, 0.0, x) if turns else (x, y, 0.0),
         )
-        limits, span = given.get(of, NO_LIMITS), spans.get(of, ROUND)
+        limits, span = limits_of.get(of, NO_LIMITS), spans.get(of, ROUND)
         computed[of] = add_joint(robot, placed, limits, span, mimic, wrapped=model.part.wrapped)
     _write_start(robot, model.part.closure, names, computed)
 
@@ -452,7 +452,7 @@ class SpaceTree:
         axis = scale(-1.0 if parent == joint.child else 1.0, direction_of(joint.axis))
         slides, at = name in linkage.slides, joint.at
         if slides:
-            at = next((linkage.points[each] for each in linkage.links.get(child, ())), on.origin)
+            at = next((linkage.points[point] for point in linkage.links.get(child, ())), on.origin)
             self._frames[child] = on._replace(origin=at)
             at = minus(at, scale(joint.value, axis))
         else:
@@ -489,9 +489,9 @@ class SpaceTree:
         """Write that two links meet at a place, which is given in the pose."""
         own_name = self.names.own_name
         loop = ET.SubElement(self._robot, 'loop_joint', name=own_name(name), type=kind)
-        one = self._frames[links[0]]
+        first_frame = self._frames[links[0]]
         for tag, link in zip(('link1', 'link2'), links, strict=True):
             frame = self._frames[link]
-            rpy = format_numbers(*roll_pitch_yaw(*map(frame.resolve, one[:3])))
+            rpy = format_numbers(*roll_pitch_yaw(*map(frame.resolve, first_frame[:3])))
             xyz = format_numbers(*frame.locate(place))
             ET.SubElement(loop, tag, link=own_name(link), xyz=xyz, rpy=rpy)

@@ -130,11 +130,11 @@ def _add_limits(
     if joint.get('type') == 'continuous':
         del known['lower'], known['upper']
     written = {
-        key: format_number(given if isfinite(given) else ours)
-        for key, (given, ours) in known.items()
+        key: format_number(value if isfinite(value) else ours)
+        for key, (value, ours) in known.items()
     }
     ET.SubElement(joint, 'limit', written)
     if mimic:
         multiplier, offset = format_number(mimic.ratio), format_number(mimic.offset)
         ET.SubElement(joint, 'mimic', joint=mimic.of, multiplier=multiplier, offset=offset)
-    return {key: written[key] for key, (given, _) in known.items() if not isfinite(given)}
+    return {key: written[key] for key, (value, _) in known.items() if not isfinite(value)}

@@ -73,7 +73,7 @@ def xml_document(root: ET.Element) -> bytes:
     """Return a whole file; the same content gives the same bytes."""
     ET.indent(root)
     text = _UNREADABLE.sub('\ufffd', ET.tostring(root, 'unicode'))
-    text = _STRUCTURE.sub(lambda found: f'&#{ord(found[0])};', text)
+    text = _STRUCTURE.sub(lambda match: f'&#{ord(match[0])};', text)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n'.encode()
 
 

@@ -93,8 +93,8 @@ def guard_call(
 class GuardedSlave(Fmi3Slave):
     """An instance whose variables are read and set by their references, in FMI's order."""
 
-    def __init__(self, **given: Any) -> None:
-        super().__init__(**given)
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
         self.state = SlaveState.INSTANTIATED
 
     def check_state(self, call: str, states: tuple[SlaveState, ...]) -> None:

@@ -77,7 +77,7 @@ _loaded: set[str] = set()
 
 class Content(NamedTuple):
     """
-    What an FMU holds beside the files of the scene, which it names in their order.
+    What an FMU holds with the files of the scene, which it names in their order.
 
     The ``version`` of linkage_ros made it; the identifier is the name, as one of C; the token
     identifies the content.
@@ -105,9 +105,9 @@ class SceneSlave(GuardedSlave):
     damaged.
     """
 
-    def __init__(self, **given: Any) -> None:
-        super().__init__(**given)
-        folder = given['resources']
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
+        folder = arguments['resources']
         try:
             self._load_content(Path(folder))
         except Exception as error:

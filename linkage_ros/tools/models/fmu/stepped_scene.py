@@ -94,23 +94,25 @@ class _Sender:
         if others := scene_linkage.instead_of_inputs:
             joints = scene_linkage.closure.measuring(*others).linkage.joints
             parts = [joints[joint] for joint in others]
-        inputs = [given.joint for given in scene_linkage.linkage.inputs]
+        inputs = [driven.joint for driven in scene_linkage.linkage.inputs]
         self.variables = []
         for field in self._fields:
-            for own, joint, given in zip(inputs, scene_linkage.sampled_joints, parts, strict=True):
+            for own, joint, driven in zip(
+                inputs, scene_linkage.sampled_joints, parts, strict=True
+            ):
                 # A motor may be commanded by another quantity, which the message calls an effort.
                 motor = parameters.for_input(own).motor if drive == 'torque' else None
                 quantity = motor.command if motor else field
                 about = f'{quantity} of the input {joint}'
                 if quantity != field:
                     about = f'{quantity} that is commanded to the motor of {joint}'
-                unit = _UNITS[quantity][given.unit == 'm']
+                unit = _UNITS[quantity][driven.unit == 'm']
                 self.variables.append(Variable(f'{line.topic}.{joint}.{quantity}', unit, about))
 
     def write_message(self, stamp: int, values: Sequence[float]) -> bytes:
         """Return the message of a time, in [ns], with values in the order of the variables."""
-        given = iter(values)
-        of = {field: tuple(islice(given, self._count)) for field in self._fields}
+        numbers = iter(values)
+        of = {field: tuple(islice(numbers, self._count)) for field in self._fields}
         # A reader of efforts ignores the positions, which every message has.
         return self._write(
             stamp,
@@ -162,7 +164,7 @@ class LinkageOutputs:
 
 def _published_fields(scene_linkage: SceneLinkage) -> list[str]:
     """Return the fields that a linkage publishes."""
-    named = {also for each in scene_linkage.effects.values() for also in each.publishes_with}
+    named = {also for effect in scene_linkage.effects.values() for also in effect.publishes_with}
     named |= {'position', *scene_linkage.effects}
     return [field for field in _READ_AS if field in named]
 
@@ -174,17 +176,17 @@ class MotorOutputs:
         scene_linkage = line.scene_linkage
         inputs = scene_linkage.linkage.inputs
         _, parameters = scene_linkage.drive
-        motors = [parameters.for_input(given.joint).motor for given in inputs]
+        motors = [parameters.for_input(driven.joint).motor for driven in inputs]
         fields = ('position', 'velocity', 'effort')[: 3 if any(motors) else 2]
         self.variables = [
             # Without a motor at an input, the reading is of what is commanded: the input itself.
             Variable(
-                f'motor.{given.joint}_motor.{field}',
-                _UNITS[field][bool(given.slider) and motor is None],
-                f'{field} of the motor of {given.joint}, as its encoder reads it',
+                f'motor.{driven.joint}_motor.{field}',
+                _UNITS[field][bool(driven.slider) and motor is None],
+                f'{field} of the motor of {driven.joint}, as its encoder reads it',
             )
             for field in fields
-            for given, motor in zip(inputs, motors, strict=True)
+            for driven, motor in zip(inputs, motors, strict=True)
         ]
         self.values = [0.0] * len(self.variables)
         """The newest values, in the order of the variables; 0 before the first."""

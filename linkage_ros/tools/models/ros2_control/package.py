@@ -9,7 +9,7 @@
 """
 A linkage as an ament_cmake package with a transmission of ros2_control.
 
-The files beside this one are copied; ``linkage.hpp`` and two headers in C are written: from the
+The files next to this one are copied; ``linkage.hpp`` and two headers in C are written: from the
 inputs to joints and their derivatives, and from the commanded joints to the inputs. Actuators are
 the inputs, and the velocities and efforts follow from the derivatives: power in is power out.
 """
@@ -34,7 +34,7 @@ _COPIED = {
     'plugins.xml': 'plugins.xml',
     'transmission.cpp': 'src/transmission.cpp',
 }
-"""The files beside this one, and where they go."""
+"""The files next to this one, and where they go."""
 
 
 def write_package(
@@ -96,8 +96,8 @@ def _constants(forward: Subject, back: Subject) -> str:
     """Return the header with names, counts and the two functions."""
     inputs, joints = forward.closure.input_names, forward.joints
     commanded = back.closure.linkage.inputs
-    places = ', '.join(str(joints.index(given.joint)) for given in commanded)
-    turns = ', '.join('false' if given.slider else 'true' for given in commanded)
+    places = ', '.join(str(joints.index(driven.joint)) for driven in commanded)
+    turns = ', '.join('false' if driven.slider else 'true' for driven in commanded)
     names = list(STATUSES)
     return f"""\
 // Names of {comment_text(forward.file)}, and its functions, for transmission.cpp.

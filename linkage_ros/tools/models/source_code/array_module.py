@@ -11,7 +11,7 @@ A linkage as a Python module for arrays of NumPy, PyTorch, JAX and CuPy, by the 
 
 The tree of the other languages becomes one straight line: each path has a mask of the states that
 take it, and `where` merges what the paths come to. Autodiff runs through all paths at every state.
-An infinite slope beside the path that a state takes would make its gradient NaN: 0 · inf. So
+An infinite slope off the path that a state takes would make its gradient NaN: 0 · inf. So
 roots, quotients and angles get a harmless argument there.
 """
 
@@ -139,8 +139,8 @@ class ArrayModule(PythonModule):
             return f'({number} - {period} * xp.round(({number}) / {period}))'
         return f'xp.{name}({", ".join(parts)})'
 
-    def write_choice(self, condition: str, one: str, other: str) -> str:
-        return f'xp.where({condition}, {one}, {other})'
+    def write_choice(self, condition: str, value: str, otherwise: str) -> str:
+        return f'xp.where({condition}, {value}, {otherwise})'
 
     def negate(self, condition: str) -> str:
         return f'~{condition}' if condition.isidentifier() else f'~({condition})'
@@ -240,7 +240,7 @@ class _MaskedWriter(TextWriter):
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
-        # Operations that differ beside the mask for which they are written, or need such ones.
+        # Operations that differ outside the mask for which they are written, or need such ones.
         self._masked: set[Operation] = set()
         self._guards: dict[tuple[str, str], str] = {}
 
@@ -250,7 +250,7 @@ class _MaskedWriter(TextWriter):
         with super().open_block() as lines:
             yield lines
             written = self._texts
-        shared = ((one, text) for one, text in written.items() if one not in self._masked)
+        shared = ((name, text) for name, text in written.items() if name not in self._masked)
         self._texts = {**dict(shared), **self._texts}
 
     def _format_expression(self, operation: Operation) -> WrittenText:
@@ -294,7 +294,7 @@ class _MaskedWriter(TextWriter):
         return WrittenText(text, _ATOM, depth)
 
     def _guard(self, operation: Operation, text: str) -> str:
-        """Return the name of an argument that is 1 beside the mask."""
+        """Return the name of an argument that is 1 outside the mask."""
         self._masked.add(operation)
         key = (self.mask, text)
         if key not in self._guards:
@@ -318,15 +318,15 @@ class _ArrayBody(SourceBody):
     writer_class = _MaskedWriter
     _writer: _MaskedWriter
 
-    def __init__(self, subject: Subject, language: ArrayModule, found: Program) -> None:
-        super().__init__(subject, language, found)
+    def __init__(self, subject: Subject, language: ArrayModule, program: Program) -> None:
+        super().__init__(subject, language, program)
         self._numbers = 0
         self._merged: set[str] = set()
 
     def write_lines(self) -> list[str]:
         inputs, writer = self._program.inputs, self._writer
         count = len(self._subject.closure.linkage.inputs)
-        names = [each.name for each in inputs]
+        names = [symbol.name for symbol in inputs]
         lines = []
         for number, operation in enumerate(inputs):
             array, index = divmod(number, count)
@@ -334,9 +334,10 @@ class _ArrayBody(SourceBody):
             writer.name_operation(operation, operation.name)
         # Where an input is not finite, a state that is known to be closed takes its place.
         lines.append(f'm0 = {self._all_finite(names[:count])}')
+        write = self._language.write_constant
         lines += (
-            f'{one.name} = xp.where(m0, {one.name}, {self._language.write_constant(one.value)})'
-            for one in inputs[:count]
+            f'{symbol.name} = xp.where(m0, {symbol.name}, {write(symbol.value)})'
+            for symbol in inputs[:count]
         )
         if names[count:]:
             lines.append(f'moving = {self._all_finite(names[count:])}')
@@ -346,9 +347,9 @@ class _ArrayBody(SourceBody):
         writer.lines += lines
         self._write_tree(self._program.tree)
         results = self._result_names()
-        without = (name for each in results for name in each if name not in self._merged)
+        without = (name for group in results for name in group if name not in self._merged)
         writer.lines += (f'{name} = zero + nan' for name in without)
-        groups = [f'_stack(xp, ({", ".join(each)},))' for each in results]
+        groups = [f'_stack(xp, ({", ".join(group)},))' for group in results]
         if names[count:]:
             writer.lines.append(f'status = xp.where(moving, status, {Status.INDETERMINATE.name})')
         writer.lines.append(f'return (status, {", ".join(groups)})')
@@ -377,19 +378,19 @@ class _ArrayBody(SourceBody):
             self._numbers += 1
             condition = f'c{self._numbers}'
             writer.lines.append(f'{condition} = {writer.write(tree.condition)}')
-            usual, other, holds = tree.held, tree.failed, condition
+            usual, unusual, holds = tree.held, tree.failed, condition
             if not tree.usual:
-                usual, other = other, usual
+                usual, unusual = unusual, usual
                 holds = f'~{condition}'
             fails = f'~{condition}' if tree.usual else condition
-            if isinstance(other, DecisionBranch | SolvedLeaf):
+            if isinstance(unusual, DecisionBranch | SolvedLeaf):
                 # What only these states need is written again for others.
                 with writer.open_block() as lines:
                     lines.append(f'm{self._numbers}b = {mask} & {fails}')
-                    self._write_tree(other, f'm{self._numbers}b')
+                    self._write_tree(unusual, f'm{self._numbers}b')
                 writer.lines += lines
-            elif other is not None:
-                writer.lines.append(f'status = xp.where({mask} & {fails}, {other.name}, status)')
+            elif unusual is not None:
+                writer.lines.append(f'status = xp.where({mask} & {fails}, {unusual.name}, status)')
             before, mask = mask, f'm{condition[1:]}'
             writer.lines.append(f'{mask} = {before} & {holds}')
             tree = usual
@@ -436,8 +437,8 @@ def write_arrays(subject: Subject) -> str:
     tables: dict[StartTable | Grid, str] = {}
     functions: list[str] = []
     for order in range(1 + subject.derivatives):
-        one = subject._replace(derivatives=order)
-        body = _ArrayBody(one, language, compile_subject(one))
+        part = subject._replace(derivatives=order)
+        body = _ArrayBody(part, language, compile_subject(part))
         body.tables = tables
         arguments = ', '.join(GIVEN[: 1 + order])
         functions += ['', '', f'def {FUNCTIONS[order]}({arguments}):', *body.write_lines()]

@@ -161,17 +161,17 @@ class C(Language):
         ]
         return [*lines, f'return {status};']
 
-    def scale_rates(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
-        end = 1 + len(given)
+    def scale_rates(self, subject: Subject, groups: Sequence[Sequence[str]]) -> list[str]:
+        end = 1 + len(groups)
         names = [f'scaled_{name}' for name in GIVEN[1:end]]
         returned = RETURNED[:end]
         arguments = ', '.join((GIVEN[0], *names, *returned))
-        arrays = zip(names, given, strict=True)
+        arrays = zip(names, groups, strict=True)
         valid = f'status <= {self.status.format(Status.LIMITED.name)}'
         return [
             *(f'const double {name}[] = {{{", ".join(group)}}};' for name, group in arrays),
             f'const enum {self._name}_status status =',
-            f'    {self.function_name(len(given))}({arguments});',
+            f'    {self.function_name(len(groups))}({arguments});',
             f'for (int i = 0; {valid} && i < {len(subject.joints)}; ++i) {{',
             *(f'    {name}[i] *= up;' for order in (1, 2) for name in returned[order:]),
             '}',
@@ -193,7 +193,10 @@ class C(Language):
         last = len(parameters) - 1
         signature = [
             f'{kind} {function}(',
-            *(f'    {each}{")" if i == last else ","}' for i, each in enumerate(parameters)),
+            *(
+                f'    {parameter}{")" if i == last else ","}'
+                for i, parameter in enumerate(parameters)
+            ),
         ]
         statuses = [
             f'    {self.status.format(status)} = {i},' for i, status in enumerate(STATUSES)

@@ -42,7 +42,7 @@ function remainder(number, period) {
 """
 
 _FOR_A_PAGE = ('joints', 'rates', 'accelerations', 'frames', 'frameRates')
-"""What the function of a page returns beside its status."""
+"""What the function of a page returns after its status."""
 
 _ORDERS = {RETURNED[1]: 1, RETURNED[2]: 2, 'rates': 1, 'accelerations': 2, 'frameRates': 1}
 """Which of all results are derivatives, and of what order."""
@@ -128,10 +128,10 @@ class JavaScript(Language):
         )
         return [f'return {{status: {status}{"".join(arrays)}}};']
 
-    def scale_rates(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
-        arguments = ''.join(f', [{", ".join(group)}]' for group in given)
+    def scale_rates(self, subject: Subject, groups: Sequence[Sequence[str]]) -> list[str]:
+        arguments = ''.join(f', [{", ".join(group)}]' for group in groups)
         return [
-            f'const found = {self.function_name(len(given))}(inputs{arguments});',
+            f'const found = {self.function_name(len(groups))}(inputs{arguments});',
             *(
                 f'found.{name} = found.{name}.map((each) => each{" * up" * _ORDERS[name]});'
                 for name in self._returned_values(subject)
@@ -146,7 +146,7 @@ class JavaScript(Language):
     def whole_source(
         self, subject: Subject, head: Sequence[str], tables: Sequence[str], body: Sequence[str]
     ) -> str:
-        given = GIVEN[: 1 + subject.derivatives]
+        parameters = GIVEN[: 1 + subject.derivatives]
         empty = ', '.join(f'{name}: []' for name in self._returned_values(subject))
         comment = (f' * {line}'.rstrip() for line in (*head, *_NOTES))
         statuses = (f'    {status}: {index},' for index, status in enumerate(STATUSES))
@@ -158,6 +158,6 @@ class JavaScript(Language):
             *(_COPYSIGN.splitlines() if any('copysign(' in line for line in body) else ()),
             *(_REMAINDER.splitlines() if any('remainder(' in line for line in body) else ()),
             *(('', *tables) if tables else ()), '',
-            f'{self._export}function {name}({", ".join(given)}) {{', *body, '}',
+            f'{self._export}function {name}({", ".join(parameters)}) {{', *body, '}',
         ]  # fmt: skip
         return '\n'.join([*lines, ''])

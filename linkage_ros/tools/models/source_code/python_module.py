@@ -57,8 +57,8 @@ class PythonModule(Language):
             return f'({parts[0]} is not None)'
         return super().write_call(operation, parts)
 
-    def write_choice(self, condition: str, one: str, other: str) -> str:
-        return f'{one} if {condition} else {other}'
+    def write_choice(self, condition: str, value: str, otherwise: str) -> str:
+        return f'{value} if {condition} else {otherwise}'
 
     def negate(self, condition: str) -> str:
         return f'not {condition}' if condition.isidentifier() else f'not ({condition})'
@@ -122,15 +122,15 @@ class PythonModule(Language):
         tuples = (f'({", ".join(group)},)' for group in groups)
         return [f'return ({", ".join([status, *tuples])})']
 
-    def scale_rates(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
+    def scale_rates(self, subject: Subject, groups: Sequence[Sequence[str]]) -> list[str]:
         names = RETURNED[: self._groups]
-        arguments = ''.join(f', ({", ".join(group)},)' for group in given)
+        arguments = ''.join(f', ({", ".join(group)},)' for group in groups)
         tuples = (
             f', tuple({"map(up.__mul__, " * order}{name}{")" * order})'
             for order, name in enumerate(names[1:], 1)
         )
         return [
-            f'status, {", ".join(names)} = {self.function_name(len(given))}(inputs{arguments})',
+            f'status, {", ".join(names)} = {self.function_name(len(groups))}(inputs{arguments})',
             f'return (status, {names[0]}{"".join(tuples)})',
         ]
 

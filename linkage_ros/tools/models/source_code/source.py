@@ -155,9 +155,9 @@ class Language(ABC):
             return f'{self.nearest}({parts[0]})'
         return f'{self.functions.get(operation.name, operation.name)}({", ".join(parts)})'
 
-    def write_choice(self, condition: str, one: str, other: str) -> str:
+    def write_choice(self, condition: str, value: str, otherwise: str) -> str:
         """Write a choice between two expressions."""
-        return f'{condition} ? {one} : {other}'
+        return f'{condition} ? {value} : {otherwise}'
 
     def negate(self, condition: str) -> str:
         """Write that a condition does not hold; this is true for NaN too."""
@@ -205,7 +205,7 @@ class Language(ABC):
         """Write lines that return a status and values."""
 
     @abstractmethod
-    def scale_rates(self, subject: Subject, given: Sequence[Sequence[str]]) -> list[str]:
+    def scale_rates(self, subject: Subject, groups: Sequence[Sequence[str]]) -> list[str]:
         """Write lines that call the function with scaled rates, and scale its results back."""
 
     @abstractmethod
@@ -304,7 +304,9 @@ def frame_values(closure: Any, motion: TracedMotion) -> list[list[Any]]:
     groups = [of.frames_at(motion.position)]
     if motion.velocity is not None:
         groups.append(of.frame_rates(motion.position, motion.velocity))
-    return [[n for place, turn in each for n in (place.real, place.imag, turn)] for each in groups]
+    return [
+        [n for place, turn in frames for n in (place.real, place.imag, turn)] for frames in groups
+    ]
 
 
 class SourceBody:
@@ -312,11 +314,11 @@ class SourceBody:
 
     writer_class: ClassVar[type[TextWriter]] = TextWriter
 
-    def __init__(self, subject: Subject, language: Language, found: Program) -> None:
+    def __init__(self, subject: Subject, language: Language, program: Program) -> None:
         self._language = language
         self._subject = subject
-        self._program = found
-        roots = list(_tree_roots(found.tree))
+        self._program = program
+        roots = list(_tree_roots(program.tree))
         self._lengths = _length_names(subject.closure)
         self._often = Counter(_used_constants(roots))
         self._named: dict[float, str] = {}
@@ -334,15 +336,15 @@ class SourceBody:
         language = self._language
         inputs = self._program.inputs
         count = len(self._subject.closure.linkage.inputs)
-        given = []
+        assignments = []
         for number, operation in enumerate(inputs):
             array, index = divmod(number, count)
-            given.append(language.assign(operation.name, f'{GIVEN[array]}[{index}]'))
+            assignments.append(language.assign(operation.name, f'{GIVEN[array]}[{index}]'))
             self._writer.name_operation(operation, operation.name)
         lines = [language.return_status(language.status.format(Status.INDETERMINATE.name))]
-        finite = [f'{language.finite}({each.name})' for each in inputs]
+        finite = [f'{language.finite}({symbol.name})' for symbol in inputs]
         usual = finite[:count]
-        groups = list(zip(*[iter(each.name for each in inputs)] * count, strict=True))
+        groups = list(zip(*[iter(symbol.name for symbol in inputs)] * count, strict=True))
         for most, names in zip(_USUAL[1:], groups[1:], strict=False):
             usual += (language.write_below(name, language.write_constant(most)) for name in names)
         if usual != finite:
@@ -357,9 +359,9 @@ class SourceBody:
                 language.assign('up', language.write_constant(1.0 / SHRINK)),
                 *language.scale_rates(self._subject, scaled),
             ]
-        given += self._write_unless(usual, lines)
+        assignments += self._write_unless(usual, lines)
         self._write_tree(self._program.tree)
-        code = (f'    {line}' for line in (*given, *self._writer.lines))
+        code = (f'    {line}' for line in (*assignments, *self._writer.lines))
         wrapped = (part for line in code for part in language.wrap_line(line))
         return [*(f'    {line}' for line in self._constant_lines()), *wrapped]
 
@@ -390,13 +392,13 @@ class SourceBody:
         language, writer = self._language, self._writer
         while isinstance(tree, DecisionBranch):
             condition = writer.write(tree.condition)
-            usual, other = tree.held, tree.failed
+            usual, unusual = tree.held, tree.failed
             if tree.usual:
                 condition = language.negate(condition)
             else:
-                usual, other = other, usual
+                usual, unusual = unusual, usual
             with writer.open_block() as lines:
-                self._write_tree(other)
+                self._write_tree(unusual)
             writer.lines += language.write_block(condition, lines)
             tree = usual
         if isinstance(tree, SolvedLeaf):
@@ -507,8 +509,8 @@ def _length_names(closure: PlanarClosure) -> dict[float, str]:
     """Return names of the lengths of links, by their values in the unit of the steps."""
     named: dict[float, set[str]] = defaultdict(set)
     for link, points in _places_of(closure.linkage).items():
-        for (one, start), (other, end) in combinations(points.items(), 2):
-            named[dist(start, end) / closure.scale].add(f'{link}_{one}_{other}')
+        for (first, start), (second, end) in combinations(points.items(), 2):
+            named[dist(start, end) / closure.scale].add(f'{link}_{first}_{second}')
         for point, place in points.items():
             for axis, value in zip('xyz', place, strict=False):
                 named[value / closure.scale].add(f'{link}_{point}_{axis}')
@@ -539,9 +541,9 @@ def head_lines(subject: Subject, function: str) -> Iterator[str]:
     yield f'from {comment_text(subject.file)}. Change that file, and compile it again.'
     yield ''
     yield f'The function {function} takes:'
-    for index, given in enumerate(linkage.inputs):
-        unit = given.unit
-        yield f'  {GIVEN[0]}[{index}]  {comment_text(given.joint)} [{unit}]'
+    for index, driven in enumerate(linkage.inputs):
+        unit = driven.unit
+        yield f'  {GIVEN[0]}[{index}]  {comment_text(driven.joint)} [{unit}]'
     yield from _derived_names(subject, GIVEN)
     yield 'and gives:'
     for index, name in enumerate(subject.joints):
