@@ -229,7 +229,7 @@ def budget_html(budget: Budget, answers: Sequence[NeedAnswer]) -> str:
     The answers are those to all needs that differ, from the greatest error to the least; the last
     one is to a need that nothing meets. Its field shows the first that reaches what is typed.
     """
-    data = {'answers': [{'error': each.error, 'text': each.text} for each in answers]}
+    data = {'answers': [{'error': answer.error, 'text': answer.text} for answer in answers]}
     body = _page_body(budget, has_field=bool(answers))
     title = f'Accuracy of {budget.scene}'
     return html_document(title, body, data, _HERE, ('page.css', 'page.js'), has_plots=False)

@@ -81,7 +81,7 @@ def measure_age_in_use(
     A LinkageError is raised if the loops close at no state of the motion.
     """
     by_sample = not scene.rate
-    rate = scene.rate or max(each.sample_rate for each in motions) or USUAL_RATE
+    rate = scene.rate or max(motion.sample_rate for motion in motions) or USUAL_RATE
     factors = _QUICK_FACTORS if quick else _FACTORS
     rates = [rate * f for f in factors if LOWEST_RATE <= rate * f <= HIGHEST_RATE]
     settings: list[Setting] = []
@@ -98,7 +98,7 @@ def measure_age_in_use(
         held, carried = errors
         settings.append(Setting(f'{_rate_label(ticks)}, held', held, None, changes, advice))
         fields: list[tuple[str, object]] = [(key, {}) for key in _rates_missing(scene)]
-        advice = ', '.join(each for each in (advice, CARRY) if each)
+        advice = ', '.join(text for text in (advice, CARRY) if text)
         label = f'{_rate_label(ticks)}, carried forward'
         settings.append(Setting(label, carried, None, [*changes, *fields], advice))
     own = f'{_rate_label(rate)}, held'
@@ -132,17 +132,17 @@ def errors_in_use(
             ahead = speed * (np.array(_PARTS) / rate)
             held[index].append(joint_distances(motion.closure, first + 0.0 * ahead, exact))
             carried[index].append(joint_distances(motion.closure, first + ahead, exact))
-    found = []
-    for one, other in zip(held, carried, strict=True):
-        errors = _over_periods(one), _over_periods(other)
+    errors_by_rate = []
+    for held_error, carried_error in zip(held, carried, strict=True):
+        errors = _over_periods(held_error), _over_periods(carried_error)
         if errors[0] is None or errors[1] is None:
             raise motions[0].scene_linkage.content.error(
                 'drive',
                 'moves the linkage nowhere where its loops close',
                 'see linkage check for where they close',
             )
-        found.append((errors[0], errors[1]))
-    return found
+        errors_by_rate.append((errors[0], errors[1]))
+    return errors_by_rate
 
 
 def _times_of_use(rate: float, horizon: float, periods: int) -> Any:
@@ -159,7 +159,7 @@ def _times_of_use(rate: float, horizon: float, periods: int) -> Any:
 
 def _over_periods(apart: Sequence[Any]) -> JointError | None:
     """Return the error of distances (periods, parts) by the nodes; None if there are none."""
-    worst = np.fmax.reduce([np.asarray(each) for each in apart])
+    worst = np.fmax.reduce([np.asarray(distances) for distances in apart])
     worst = worst[np.isfinite(worst).all(axis=1)]
     if not len(worst):
         return None
@@ -194,7 +194,7 @@ def measure_age_of_command(
             label or f'{_rate_label(motion.sample_rate * factor)}, {_use_of(used)}',
             error,
             price,
-            [(f'{key}.{one}', value) for one, value in changes.items()],
+            [(f'{key}.{parameter}', value) for parameter, value in changes.items()],
             advice,
         )
 
@@ -215,7 +215,7 @@ def measure_age_of_command(
         for factor in (0.5, 2.0, 5.0) if not quick else (0.5, 2.0):
             advice = f'publish the crank at {motion.sample_rate * factor:g} Hz'
             settings.append(measure_setting({}, factor, advice))
-    return Knob(OF_COMMAND, [each for each in settings if each], 0, note=motion.note)
+    return Knob(OF_COMMAND, [setting for setting in settings if setting], 0, note=motion.note)
 
 
 def _offer_time(motion: LinkageMotion, seconds: float) -> Spread:
@@ -300,7 +300,7 @@ class _CommandSamples:
     ) -> list[Crank | None]:
         """Return what a drive makes of the samples at each tick."""
         inputs = self._motion.closure.linkage.inputs
-        found: list[Crank | None] = []
+        cranks: list[Crank | None] = []
         for tick in ticks:
             drive = sample_inputs(use, True, inputs)
             for stamp, come in samples_before(tick):
@@ -308,8 +308,8 @@ class _CommandSamples:
                 if crank is not None:
                     drive.offer(CrankSample(BEGIN + stamp, *crank), BEGIN + come)
             state = drive.state(BEGIN + tick)
-            found.append(None if state is None else (state.angles, state.rates))
-        return found
+            cranks.append(None if state is None else (state.angles, state.rates))
+        return cranks
 
 
 def _rates_missing(scene: Scene) -> list[str]:

@@ -72,7 +72,7 @@ class Setting(NamedTuple):
     @property
     def instruction(self) -> str:
         """Return what a user writes, and does: 'drive.torque.step: 0.0005'."""
-        written = [_setting_text(*each) for each in self.changes or ()]
+        written = [_setting_text(*change) for change in self.changes or ()]
         return ', '.join([*written, *([self.advice] if self.advice else [])])
 
 

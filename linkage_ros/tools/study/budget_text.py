@@ -98,7 +98,7 @@ def change_text(budget: Budget, knob: Knob, setting: Setting) -> str:
 
 
 class Neighbours(NamedTuple):
-    """The settings beside the scene's own that a user can ask for; None where there is none."""
+    """Settings other than the scene's own that a user can ask for; None where there is none."""
 
     cheaper: Setting | None  # The most exact of those that cost less
     better: Setting | None  # Of the more exact ones the first that comes with more cost
@@ -107,12 +107,12 @@ class Neighbours(NamedTuple):
 def neighbours_of(budget: Budget, knob: Knob) -> Neighbours:
     """Return the next cheaper and the next better setting of a knob."""
     own = knob.own_setting
-    others = [each for each in knob.settings if each is not own and each.instruction]
-    cheaper = [each for each in others if added_core(budget, knob, each) < 0.0]
-    better = [each for each in others if each.error.worst < _SAME * own.error.worst]
+    others = [setting for setting in knob.settings if setting is not own and setting.instruction]
+    cheaper = [setting for setting in others if added_core(budget, knob, setting) < 0.0]
+    better = [setting for setting in others if setting.error.worst < _SAME * own.error.worst]
     return Neighbours(
-        min(cheaper, key=lambda each: each.error.worst, default=None),
-        min(better, key=lambda each: _setting_effort(budget, knob, each), default=None),
+        min(cheaper, key=lambda setting: setting.error.worst, default=None),
+        min(better, key=lambda setting: _setting_effort(budget, knob, setting), default=None),
     )
 
 
@@ -125,7 +125,7 @@ def added_core(budget: Budget, knob: Knob, setting: Setting) -> float:
 
 
 def _setting_effort(budget: Budget, knob: Knob, setting: Setting) -> tuple[float, int, float]:
-    """Return how much a more exact setting asks for: cost, then keys. That it saves is no gain."""
+    """Return how much a more exact setting asks for: cost, then keys. Saving is not a gain."""
     more = max(0.0, added_core(budget, knob, setting))
     return more, len(setting.changes or ()), setting.error.worst
 
@@ -187,12 +187,16 @@ def _knob_name(knob: Knob) -> str:
 def _advice_line(budget: Budget, knob: Knob) -> str:
     """Return what to write for less of the greatest error."""
     total = total_error(budget)
-    rest = sum(each.own_setting.error.worst for each in error_knobs(budget) if each is not knob)
-    others = [each for each in knob.settings if each is not knob.own_setting and each.instruction]
+    rest = sum(k.own_setting.error.worst for k in error_knobs(budget) if k is not knob)
+    others = [
+        setting
+        for setting in knob.settings
+        if setting is not knob.own_setting and setting.instruction
+    ]
     for factor, words in ((0.1, 'a tenth'), (0.2, 'a fifth'), (0.5, 'half')):
-        good = [each for each in others if rest + each.error.worst <= factor * total]
+        good = [setting for setting in others if rest + setting.error.worst <= factor * total]
         if good:
-            best = min(good, key=lambda each: _setting_effort(budget, knob, each))
+            best = min(good, key=lambda setting: _setting_effort(budget, knob, setting))
             return (
                 f'less than {words} of it: {best.instruction} ({_cost_text(budget, knob, best)})'
             )
@@ -263,7 +267,7 @@ def _error_row(budget: Budget, knob: Knob) -> Row:
     after = f', after {knob.after:g} s' if knob.after is not None else ''
     name = f'{knob.name} ({own.label}){after}'
     # A rate sets what the whole tick takes of a core.
-    sets_rate = any(key == 'rate' for each in knob.settings for key, _ in each.changes or ())
+    sets_rate = any(key == 'rate' for setting in knob.settings for key, _ in setting.changes or ())
     core = budget.tick.core_share if sets_rate else own.price.core_share if own.price else None
     cheaper, better = (
         setting
@@ -303,7 +307,7 @@ def _deliberate_row(knob: Knob) -> Row:
 def _recording_row(losses: Sequence[RecordingLoss]) -> Row:
     own, *others = losses
     cheaper, better = (
-        next((each for each in others if (each.seconds < own.seconds) == is_better), None)
+        next((loss for loss in others if (loss.seconds < own.seconds) == is_better), None)
         for is_better in (False, True)
     )
     lost = f'recording: a crash loses {seconds_text(own.seconds)} at worst'
@@ -313,11 +317,11 @@ def _recording_row(losses: Sequence[RecordingLoss]) -> Row:
         _NONE,
         *_own_price(own.price),
         *(
-            f'{each.instruction} ({seconds_text(each.seconds)}, '
-            f'{_more_text(each.price, own.price)})'
-            if each
+            f'{loss.instruction} ({seconds_text(loss.seconds)}, '
+            f'{_more_text(loss.price, own.price)})'
+            if loss
             else '–'
-            for each in (cheaper, better)
+            for loss in (cheaper, better)
         ),
     )
 
@@ -344,7 +348,7 @@ def closing_lines(budget: Budget) -> list[str]:
     if prices:
         said += f'; {noisy} of {len(prices)} prices lie {NOISE} and are called so'
     notes = [f'{knob.name}: {knob.note}' for knob in error_knobs(budget) if knob.note]
-    return [said, *notes, *(f'left out: {each}' for each in budget.left_out)]
+    return [said, *notes, *(f'left out: {reason}' for reason in budget.left_out)]
 
 
 def budget_table(budget: Budget) -> Table:
@@ -401,12 +405,12 @@ def budget_json(budget: Budget) -> dict[str, Any]:
         ],
         'recording': [
             {
-                'write': each.instruction,
-                'lost_s': each.seconds,
-                'price': _price_json(each.price),
-                'dropped': each.dropped,
+                'write': loss.instruction,
+                'lost_s': loss.seconds,
+                'price': _price_json(loss.price),
+                'dropped': loss.dropped,
             }
-            for each in budget.recording
+            for loss in budget.recording
         ],
         'left_out': list(budget.left_out),
         'machine': dict(budget.machine),

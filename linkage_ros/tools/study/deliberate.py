@@ -94,25 +94,28 @@ def compare_runs(
         for joint in scene_linkage.joint_names
     }
     compared = [_RunDifference() for _ in others]
-    own, *runs = (published_states(each, feed, ticks) for each in (scene, *others))
-    for tick, ((is_new, state), *found) in enumerate(zip(own, *runs, strict=True)):
-        for one, (other_is_new, other) in zip(compared, found, strict=True):
-            one.silent += other_is_new and not is_new
-            if state and other and state != other:
-                one.add_difference(
+    own, *runs = (published_states(variant, feed, ticks) for variant in (scene, *others))
+    for tick, ((is_new, state), *others_now) in enumerate(zip(own, *runs, strict=True)):
+        for comparison, (other_is_new, other_state) in zip(compared, others_now, strict=True):
+            comparison.silent += other_is_new and not is_new
+            if state and other_state and state != other_state:
+                comparison.add_difference(
                     max(
-                        abs(remainder(value - other[joint], tau))
+                        abs(remainder(value - other_state[joint], tau))
                         if turning[joint]
-                        else abs(value - other[joint]) / sizes[joint]
+                        else abs(value - other_state[joint]) / sizes[joint]
                         for joint, value in state.items()
-                        if joint in other
+                        if joint in other_state
                     )
                 )
         if tick % 100 == 0:
             progress(tick / ticks)
     return [
-        Difference(JointError(sqrt(one.squares / ticks), one.worst), one.silent / ticks)
-        for one in compared
+        Difference(
+            JointError(sqrt(comparison.squares / ticks), comparison.worst),
+            comparison.silent / ticks,
+        )
+        for comparison in compared
     ]
 
 
@@ -140,7 +143,7 @@ def leave_out(scene: Scene, names: frozenset[str]) -> Scene:
 def _without_effects(scene_linkage: SceneLinkage, names: frozenset[str]) -> SceneLinkage:
     effects = {name: own for name, own in scene_linkage.effects.items() if name not in names}
     has_forces = scene_linkage.drive[1].gives_torque or any(
-        each.computes_forces for each in effects.values()
+        effect.computes_forces for effect in effects.values()
     )
     return replace(
         scene_linkage, effects=effects, loads=scene_linkage.loads if has_forces else None
@@ -171,7 +174,7 @@ def _list_variants(scene: Scene) -> Iterator[_Variant]:
                 yield _Variant(name, less, note)
                 break
     for name, fault in scene.faults.items():
-        faults = {key: other for key, other in scene.faults.items() if key != name}
+        faults = {key: fault for key, fault in scene.faults.items() if key != name}
         note = '' if fault.at else 'not injected by the scene itself: only when it is called for'
         yield _Variant(f'fault {name}', replace(scene, faults=faults, record=None), note)
     if len(named) + len(scene.faults) > 1:
@@ -227,13 +230,13 @@ def measure_deliberate(
         Knob(
             variant.name,
             # What the scene has more than the one without.
-            (Setting('as the scene has it', found.error, price.negate()),),
+            (Setting('as the scene has it', difference.error, price.negate()),),
             0,
-            after if found.error.worst else None,
+            after if difference.error.worst else None,
             is_deliberate=True,
-            note=_variant_note(variant, found),
+            note=_variant_note(variant, difference),
         )
-        for variant, found, price in zip(variants, differences, prices, strict=True)
+        for variant, difference, price in zip(variants, differences, prices, strict=True)
     ]
     return sorted(
         knobs,
@@ -246,9 +249,11 @@ def measure_deliberate(
     )
 
 
-def _variant_note(variant: _Variant, found: Difference) -> str:
+def _variant_note(variant: _Variant, difference: Difference) -> str:
     parts = [
         variant.note,
-        f'nothing is published at {share_text(found.silent)} of the ticks' if found.silent else '',
+        f'nothing is published at {share_text(difference.silent)} of the ticks'
+        if difference.silent
+        else '',
     ]
     return '; '.join(filter(None, parts))

@@ -109,14 +109,14 @@ def measure_drive_step(
             left_out.append(_setting_label(method, step))
             continue
         try:
-            other = cranks_at(motion, ticks, method=method, step=step)
+            cranks = cranks_at(motion, ticks, method=method, step=step)
         except DefinitionError:
             continue  # The scene refuses a step that is too long for its forces.
         changes: list[tuple[str, object]] = (
             [(f'{key}.method', method)] if method != use.method else []
         )
         changes += [(f'{key}.step', step)] if step != use.step else []
-        error = _measure_error(motion, other, joints, floor)
+        error = _measure_error(motion, cranks, joints, floor)
         settings.append(Setting(_setting_label(method, step), error, None, changes))
     progress(1.0)
     note = motion.note
@@ -155,13 +155,13 @@ def exact_cranks(
     if _stands_in(motion):
         steps = (max(_SHORTEST, use.step / finest), max(2.0 * _SHORTEST, 2.0 * use.step / finest))
         method = _exact_method(use)
-        one, other = (cranks_at(motion, times, method=method, step=step) for step in steps)
+        coarse, fine = (cranks_at(motion, times, method=method, step=step) for step in steps)
         part = 3.0
     else:
-        one, other = (_integrate_exactly(motion, times, factor) for factor in (1.0, 10.0))
+        coarse, fine = (_integrate_exactly(motion, times, factor) for factor in (1.0, 10.0))
         part = 6.0
-    doubt = error_of([_distances_to_exact(motion, other, joints_at(motion.closure, one)[0])])
-    return one, doubt and JointError(doubt.rms / part, doubt.worst / part)
+    doubt = error_of([_distances_to_exact(motion, fine, joints_at(motion.closure, coarse)[0])])
+    return coarse, doubt and JointError(doubt.rms / part, doubt.worst / part)
 
 
 def _stands_in(motion: LinkageMotion) -> bool:
@@ -199,12 +199,12 @@ def _integrate_exactly(
     ]
     seconds = [time * 1e-9 for time in times]
     try:
-        found = exact_drive.exact_motion(
+        states = exact_drive.exact_motion(
             drive.motion, acting, seconds, exact_drive.TOLERANCE * factor
         )
     except exact_drive.NoMotionError as error:
         raise refuse_horizon(error.time, 'its exact motion ends') from None
-    return [((value,), (rate,)) for value, rate in found]
+    return [((value,), (rate,)) for value, rate in states]
 
 
 def _distances_to_exact(motion: LinkageMotion, cranks: Sequence[Crank | None], exact: Any) -> Any:

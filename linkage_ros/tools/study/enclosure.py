@@ -73,9 +73,9 @@ def prove(
     try:
         for ctx.prec in _PRECISIONS:
             equations = constraints_of(closure, inputs, rates, accelerations)
-            found = _prove_solution(equations, equations.initial_unknowns(closure, inputs))
-            if found is not None:
-                return equations.prove_joints(found)
+            balls = _prove_solution(equations, equations.initial_unknowns(closure, inputs))
+            if balls is not None:
+                return equations.prove_joints(balls)
     finally:
         ctx.prec = before
     raise SingularError(f'{tuple(inputs)}: nothing is proved')
@@ -86,10 +86,10 @@ def solve(closure: Closure, inputs: Sequence[float], bits: int) -> tuple[Any, ..
     before, ctx.prec = ctx.prec, bits
     try:
         equations = constraints_of(closure, inputs)
-        found = _iterate_newton(equations, equations.initial_unknowns(closure, inputs))
-        if found is None:
+        unknowns = _iterate_newton(equations, equations.initial_unknowns(closure, inputs))
+        if unknowns is None:
             raise SingularError(f'{tuple(inputs)}: nothing converges')
-        return equations.joint_values(found)
+        return equations.joint_values(unknowns)
     finally:
         ctx.prec = before
 
@@ -109,7 +109,7 @@ def constraints_of(
     accelerations = [0.0] * len(inputs) if accelerations is None else accelerations
     driven = [*zip(map(arb, inputs), map(arb, rates), map(arb, accelerations), strict=True)]
     equations: ExactConstraints
-    given: Any = closure
+    untyped: Any = closure
     if isinstance(closure, PlanarClosure):
         equations = _PlanarConstraints(closure, driven)
     else:
@@ -117,7 +117,7 @@ def constraints_of(
             SpatialConstraints,  # local import: in space only
         )
 
-        equations = SpatialConstraints(given, driven)
+        equations = SpatialConstraints(untyped, driven)
     more = len(equations.constraints) - equations.count
     if more:
         reason = f'{abs(more)} constraints {"more" if more > 0 else "less"} than unknowns'
@@ -163,11 +163,11 @@ class _PlanarConstraints(ExactConstraints):
                 )
         for joint, (x, v, a) in zip(linkage.inputs, driven, strict=True):
             if joint.slider:
-                given = (-x / self.scale, -v / self.scale, -a / self.scale)
-                self.constraints.append([*self._slides[joint.slider], (given, 0, 0)])
+                slide = (-x / self.scale, -v / self.scale, -a / self.scale)
+                self.constraints.append([*self._slides[joint.slider], (slide, 0, 0)])
                 continue
-            one = acb(x.cos(), x.sin())
-            series = (one, one * acb(0, v), one * acb(-v * v, a))
+            unit_vector = acb(x.cos(), x.sin())
+            series = (unit_vector, unit_vector * acb(0, v), unit_vector * acb(-v * v, a))
             self.constraints.append(
                 _cross_product(
                     self._link_direction(joint.parent, acb(1)),
@@ -217,8 +217,8 @@ class _PlanarConstraints(ExactConstraints):
             return (-between).log().imag + arb.pi()
         return between.log().imag
 
-    def _add_pin(self, one: Form, other: Form) -> None:
-        between = _subtract_forms(one, other)
+    def _add_pin(self, first: Form, second: Form) -> None:
+        between = _subtract_forms(first, second)
         self.constraints.append([constant_term(c.real, 0, k) for k, c in between])
         self.constraints.append([constant_term(c.imag, 0, k) for k, c in between])
 
@@ -246,7 +246,7 @@ def _iterate_newton(equations: ExactConstraints, start: list[Any]) -> list[Any] 
                 arb_mat([[v] for v in equations.compute_residuals([x])])
             )
             x = [arb(1), *((a - b).mid() for a, b in zip(x[1:], step.entries(), strict=True))]
-            if max(float(abs(one).mid()) for one in step.entries()) < enough:
+            if max(float(abs(entry).mid()) for entry in step.entries()) < enough:
                 break
     except ZeroDivisionError:
         return None
@@ -263,14 +263,14 @@ def _prove_solution(equations: ExactConstraints, start: list[Any]) -> list[Any] 
     except ZeroDivisionError:
         return None
     radius = arb(0, arb(2) ** -_RADIUS)
-    ball = [arb(1), *(one + radius for one in x[1:])]
+    ball = [arb(1), *(component + radius for component in x[1:])]
     constant = inverse * arb_mat([[v] for v in equations.compute_residuals([x])])
-    one = arb_mat(
+    identity = arb_mat(
         equations.count,
         equations.count,
         [int(i == j) for i in range(equations.count) for j in range(equations.count)],
     )
-    spread = (one - inverse * equations.compute_jacobian(ball)) * arb_mat(
+    spread = (identity - inverse * equations.compute_jacobian(ball)) * arb_mat(
         [[radius]] * equations.count
     )
     image = [
@@ -282,25 +282,27 @@ def _prove_solution(equations: ExactConstraints, start: list[Any]) -> list[Any] 
     return None
 
 
-def _dot_product(one: Form, other: Form) -> list[Term]:
-    return [constant_term((_conjugate(c) * d).real, i, j) for i, c in one for j, d in other]
+def _dot_product(first: Form, second: Form) -> list[Term]:
+    return [constant_term((_conjugate(c) * d).real, i, j) for i, c in first for j, d in second]
 
 
-def _cross_product(one: Form, other: Form, turn: Sequence[Any] = ()) -> list[Term]:
+def _cross_product(first: Form, second: Form, turn: Sequence[Any] = ()) -> list[Term]:
     """Return one × other, with the first rotated by the series of a unit vector."""
     if not turn:
-        return [constant_term((_conjugate(c) * d).imag, i, j) for i, c in one for j, d in other]
+        return [constant_term((_conjugate(c) * d).imag, i, j) for i, c in first for j, d in second]
     return [
-        (tuple((_conjugate(c * t) * d).imag for t in turn), i, j) for i, c in one for j, d in other
+        (tuple((_conjugate(c * t) * d).imag for t in turn), i, j)
+        for i, c in first
+        for j, d in second
     ]
 
 
-def _subtract_forms(one: Form, other: Form) -> Form:
-    return [*one, *((k, -c) for k, c in other)]
+def _subtract_forms(first: Form, second: Form) -> Form:
+    return [*first, *((k, -c) for k, c in second)]
 
 
-def _complex_cross(one: Any, other: Any) -> Any:
-    return (_conjugate(one) * other).imag
+def _complex_cross(first: Any, second: Any) -> Any:
+    return (_conjugate(first) * second).imag
 
 
 def _conjugate(number: Any) -> Any:

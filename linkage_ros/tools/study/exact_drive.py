@@ -134,17 +134,17 @@ def exact_motion(
     efforts from 0 on; ``tolerance`` is the relative and absolute tolerance of a step. A
     NoMotionError is raised if the motion ends before the last time.
     """
-    found: list[State] = []
+    states: list[State] = []
     run = _ExactRun(start, tolerance)
-    ends = [*(each.time for each in acting[1:]), inf]
+    ends = [*(change.time for change in acting[1:]), inf]
     for now, end in zip(acting, ends, strict=True):
         until = min(end, times[-1])
-        begin = len(found)
+        begin = len(states)
         wanted = [time for time in times[begin:] if time < end or end == inf]
-        found += run.advance_until(now, until, wanted)
-        if end >= times[-1] and len(found) == len(times):
+        states += run.advance_until(now, until, wanted)
+        if end >= times[-1] and len(states) == len(times):
             break
-    return found
+    return states
 
 
 class _ExactRun:
@@ -166,7 +166,7 @@ class _ExactRun:
         self, acting: AppliedEffort, until: float, times: Sequence[float]
     ) -> list[State]:
         """Move on under what acts; return the crank at some times up to the end."""
-        found: list[State] = []
+        states: list[State] = []
         while self._time < until:
             self._pieces += 1
             if self._pieces > _MOST_PIECES:
@@ -174,9 +174,9 @@ class _ExactRun:
             bodies = self._moving_masses(acting)
             for body in bodies:
                 body.find_direction(self._time)
-            begin = len(found)
-            found += self._integrate_piece(bodies, acting, until, times[begin:])
-        return found + [self._crank] * (len(times) - len(found))
+            begin = len(states)
+            states += self._integrate_piece(bodies, acting, until, times[begin:])
+        return states + [self._crank] * (len(times) - len(states))
 
     def _moving_masses(self, acting: AppliedEffort) -> list[_MovingMass]:
         """Return what moves: the crank, crank and motor apart, or both as one."""
@@ -233,7 +233,7 @@ class _ExactRun:
             state_derivative, self._time, begin, until, rtol=self._tolerance, atol=self._tolerance,
             first_step=first,
         )  # fmt: skip
-        found: list[State] = []
+        states: list[State] = []
         armed = [margin(self._time, begin) > 0.0 for margin, _ in events]
         while solver.status == 'running':
             solver.step()
@@ -245,15 +245,15 @@ class _ExactRun:
             dense = solver.dense_output()
             event = _first_event(events, armed, dense, before, now) if events else None
             stop = event[0] if event else now
-            while len(found) < len(times) and times[len(found)] <= stop:
-                value, rate = dense(times[len(found)])[:2]
-                found.append((float(value), float(rate)))
+            while len(states) < len(times) and times[len(states)] <= stop:
+                value, rate = dense(times[len(states)])[:2]
+                states.append((float(value), float(rate)))
             if event:
                 self._store_state(bodies, dense(stop), stop, acting)
                 events[event[1]][1]()
-                return found
+                return states
         self._store_state(bodies, solver.y, until, acting)
-        return found
+        return states
 
     def _wait_at_rest(self, bodies: list[_MovingMass], until: float) -> None:
         """Let the time pass while nothing moves."""
@@ -358,13 +358,13 @@ class _ExactRun:
         e = 0.0 if brief else masses.restitution
         low, high = masses.crank.stops
         if w == 0.0 and q == (high if side > 0 else low):
-            own, other = 0.0, 1.0  # A crank at its stop is a wall.
+            own, wall = 0.0, 1.0  # A crank at its stop is a wall.
         else:
-            own, other = masses.motor.terms(phi).inertia, masses.crank.terms(q).inertia
-        common = (own * nu + other * w) / (own + other)
-        bounce = e * (nu - w) / (own + other)
+            own, wall = masses.motor.terms(phi).inertia, masses.crank.terms(q).inertia
+        common = (own * nu + wall * w) / (own + wall)
+        bounce = e * (nu - w) / (own + wall)
         self._crank = q, common + own * bounce
-        self._motor = q + side * masses.half, common - other * bounce
+        self._motor = q + side * masses.half, common - wall * bounce
         self._side = 0 if bounce else side
 
 
@@ -380,17 +380,17 @@ def _first_event(
     for part in range(1, _LOOKS + 1):
         at = before + (now - before) * part / _LOOKS
         state = dense(at)
-        found: list[tuple[float, int]] = []
+        passed: list[tuple[float, int]] = []
         for index, (margin, _) in enumerate(events):
             value = margin(at, state)
             if value >= 0.0:
                 armed[index] |= value > 0.0
             elif armed[index] and margin(low, dense(low)) > 0.0:
                 root = brentq(lambda t, m=margin: m(t, dense(t)), low, at, xtol=1e-15, rtol=1e-14)
-                found.append((root, index))
+                passed.append((root, index))
             else:
-                found.append((low, index))
-        if found:
-            return min(found)
+                passed.append((low, index))
+        if passed:
+            return min(passed)
         low = at
     return None

@@ -79,17 +79,17 @@ class PlainFourBar(NamedTuple):
 def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
     """Return a linkage as a four-bar, or None if it is anything else."""
     structure = assur_groups(linkage)
-    found = list(four_bars(structure))
+    loops = list(four_bars(structure))
     driven = [group for group in structure.groups if isinstance(group, Driven)]
-    if len(found) != 1 or len(structure.groups) != 2 or len(driven) != 1 or linkage.sliders:
+    if len(loops) != 1 or len(structure.groups) != 2 or len(driven) != 1 or linkage.sliders:
         return None
-    crank, coupler, rocker, ground = found[0].links
+    crank, coupler, rocker, ground = loops[0].links
     if ground != GROUND or not all(
         isinstance(joint, RevoluteJoint) for joint in linkage.joints.values()
     ):
         return None
-    ends: Callable[[str, str], str] = lambda one, other: next(  # noqa: E731  # a word for it
-        name for name in linkage.links[one] if name in linkage.links[other]
+    ends: Callable[[str, str], str] = lambda first, second: next(  # noqa: E731  # a word for it
+        name for name in linkage.links[first] if name in linkage.links[second]
     )
     pivot, pin = ends(crank, ground), ends(crank, coupler)
     closing, far = ends(coupler, rocker), ends(rocker, ground)
@@ -110,7 +110,7 @@ def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
     # The angle of a link is its direction less its arm's; 0 for the ground.
     constants = {link: level - arm for link, arm in arms.items()}
     return PlainFourBar(
-        *found[0].lengths,
+        *loops[0].lengths,
         side=1.0 if written_sides(PlanarClosure(linkage))[closing] == 'left' else -1.0,
         turn=turn,
         offset=arms[crank] - level,

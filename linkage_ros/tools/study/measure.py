@@ -79,8 +79,10 @@ def measure_budget(
 
     knobs: list[Knob] = []
     if ERRORS in parts:
-        found, more = _measure_errors(scene, motions, horizon, quick, feed, part_progress(ERRORS))
-        knobs += sorted(found, key=lambda knob: knob.own_setting.error.worst, reverse=True)
+        error_knobs, more = _measure_errors(
+            scene, motions, horizon, quick, feed, part_progress(ERRORS)
+        )
+        knobs += sorted(error_knobs, key=lambda knob: knob.own_setting.error.worst, reverse=True)
         left_out += more
         done += _SHARES[ERRORS] / whole
     tick = tick_price(scene, 0.5 if quick else 3.0, feed, _QUICK_TICK if quick else inf)
@@ -158,10 +160,10 @@ def _measure_errors(
             )
             left_out += missing
         else:
-            found = measure_age_of_command(motion, scene, horizon, quick=quick)
-            if found is None:
+            measured = measure_age_of_command(motion, scene, horizon, quick=quick)
+            if measured is None:
                 continue
-            knob = found
+            knob = measured
         of = f' of {motion.scene_linkage.name}' if motion.scene_linkage.name else ''
         knobs.append(knob._replace(name=knob.name + of))
     progress(0.5)
@@ -181,7 +183,7 @@ def _measure_errors(
     priced = add_prices(
         scene, knobs, seconds, feed, lambda share: progress(0.7 + 0.3 * share), most
     )
-    fewer = sum(len(knob.settings) for knob in knobs) - sum(len(one.settings) for one in priced)
+    fewer = sum(len(knob.settings) for knob in knobs) - sum(len(knob.settings) for knob in priced)
     if fewer:
         left_out.append(f'for lack of time: {fewer} settings farther from the own one')
     return priced, left_out
@@ -190,7 +192,7 @@ def _measure_errors(
 def _accepted_settings(scene: Scene, knob: Knob) -> Knob:
     """Return a knob without the settings that the scene refuses."""
     own = knob.own_setting
-    kept = [each for each in knob.settings if each is own or _is_accepted(scene, each)]
+    kept = [setting for setting in knob.settings if setting is own or _is_accepted(scene, setting)]
     return knob._replace(settings=kept, chosen=kept.index(own))
 
 

@@ -109,7 +109,7 @@ def time_in_turn(candidates: Sequence[Candidate], seconds: float) -> list[Spread
     forward = [*zip(candidates, repeats, times, strict=True)]
     collecting = gc.isenabled()
     try:
-        for (run, states), count, found in alternate_order(forward, rounds):
+        for (run, states), count, durations in alternate_order(forward, rounds):
             gc.disable()
             begun = clock()
             for _ in range(count):
@@ -117,11 +117,11 @@ def time_in_turn(candidates: Sequence[Candidate], seconds: float) -> list[Spread
             taken = clock() - begun
             if collecting:
                 gc.enable()
-            found.append(taken / (count * states))
+            durations.append(taken / (count * states))
     finally:
         if collecting:
             gc.enable()
-    return [spread_of(found) for found in times]
+    return [spread_of(durations) for durations in times]
 
 
 def thread_clock() -> Callable[[], float]:

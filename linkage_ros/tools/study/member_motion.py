@@ -84,7 +84,7 @@ def cranks_at(motion: LinkageMotion, times: Sequence[int], **changes: Any) -> li
     commands, number = motion.commands, 0
     passed = 0
     drive.state(BEGIN)
-    found: list[Crank | None] = []
+    cranks: list[Crank | None] = []
     for time in times:
         # A drive that is asked too seldom leaves time out, and a runaway is to be seen early.
         for stop in (*range(passed - passed % look + look, time, look), time):
@@ -95,8 +95,8 @@ def cranks_at(motion: LinkageMotion, times: Sequence[int], **changes: Any) -> li
             crank = drive.state(BEGIN + stop)
             _check_bounded(crank, stop, step)
         passed = time
-        found.append((crank.angles, crank.rates))
-    return found
+        cranks.append((crank.angles, crank.rates))
+    return cranks
 
 
 def draw_instants(length: float, most: int) -> list[float]:
@@ -159,9 +159,9 @@ def size_of(linkage: Linkage | SpaceLinkage) -> float:
         places = [*linkage.points.values(), *(hinge.at for hinge in linkage.hinges.values())]
         return max((dist(*pair) for pair in combinations(places, 2)), default=1.0) or 1.0
     return max(
-        abs(complex(*one) - complex(*other))
+        abs(complex(*first) - complex(*second))
         for points in linkage.links.values()
-        for one, other in combinations(points.values(), 2)
+        for first, second in combinations(points.values(), 2)
     )
 
 
@@ -197,7 +197,7 @@ def joint_distances(closure: Closure, joints: Any, exact: Any) -> Any:
 
 def error_of(apart: Sequence[Any]) -> JointError | None:
     """Return the error of some distances, of all linkages together; None if there are none."""
-    known = np.fmax.reduce([np.ravel(each) for each in apart])
+    known = np.fmax.reduce([np.ravel(distances) for distances in apart])
     known = known[np.isfinite(known)]
     if not len(known):
         return None

@@ -83,7 +83,7 @@ def _best_choices(budget: Budget) -> list[_SettingChoice]:
         error = sum(setting.error.worst for setting in settings)
         choices.append(_SettingChoice(cost, changed, error, settings))
     best: list[_SettingChoice] = []
-    for choice in sorted(choices, key=lambda one: one[:3]):
+    for choice in sorted(choices, key=lambda choice: choice[:3]):
         if not best or choice.error < best[-1].error:
             best.append(choice)
     return best
@@ -95,7 +95,9 @@ def _error_knobs(budget: Budget) -> list[Knob]:
 
 def _candidate_settings(budget: Budget, knob: Knob) -> Iterator[Setting]:
     """Yield the settings of a knob that can be asked for and that no other one beats."""
-    asked = [each for each in knob.settings if each is knob.own_setting or each.instruction]
+    asked = [
+        setting for setting in knob.settings if setting is knob.own_setting or setting.instruction
+    ]
     least = float('inf')
     ranked = sorted(
         asked,

@@ -12,7 +12,7 @@ The picture of a budget: error against cost, one curve for each knob, as SVG.
 Across is the core that the whole scene takes with a setting, so all curves meet on the line of the
 scene as it is. Settings that another one of the same knob beats in both are pale and without a
 line. A label takes a place where it covers no mark, no line and no other label; if there is none,
-the setting has its name only as a title, which a browser shows beside the pointer.
+the setting has its name only as a title, which a browser shows next to the pointer.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ class _Picture:
         settings = [(knob, setting) for knob in knobs for setting in knob.settings]
         costs = [budget.core_of(knob, setting) for knob, setting in settings]
         errors = [_drawn_error(setting) for _, setting in settings]
-        # Room beside the outermost marks, for their labels.
+        # Room next to the outermost marks, for their labels.
         low, high = log10(min(costs)), log10(max(costs))
         self.x = _Scale(low - 0.25, high + 0.45, _LEFT, WIDTH - _RIGHT)
         self.y = _Scale(
@@ -168,9 +168,9 @@ class _Picture:
         """Return the labels that have a free place; the scene's settings come first."""
         taken = [mark.box for marks in self.curves for mark in marks]
         segments = [
-            ((one.x, one.y), (other.x, other.y))
+            ((start.x, start.y), (end.x, end.y))
             for line in self.curve_marks()
-            for one, other in pairwise(line)
+            for start, end in pairwise(line)
         ]
         segments.append(((self.own_x, self.top), (self.own_x, self.bottom)))
         named = [
@@ -178,9 +178,9 @@ class _Picture:
             for index, marks in enumerate(self.curves)
             for mark in marks
         ]
-        named.sort(key=lambda each: (not each[0].is_own, each[0].is_pale))
+        named.sort(key=lambda mark: (not mark[0].is_own, mark[0].is_pale))
         plot = Box(_LEFT + 3.0, self.top, WIDTH - _RIGHT - 3.0, self.bottom)
-        found = []
+        labels = []
         for mark, colour in named:
             text = mark.setting.label
             box = next(
@@ -188,17 +188,17 @@ class _Picture:
                     box
                     for box in _places_beside(mark, text)
                     if _is_within(box, plot)
-                    and not any(box.overlaps(other) for other in taken)
+                    and not any(box.overlaps(label) for label in taken)
                     and not any(_is_crossed(box, *segment) for segment in segments)
                 ),
                 None,
             )
             if box is not None:
                 taken.append(box)
-                found.append(
+                labels.append(
                     PlacedLabel(text, box, _FAINT if mark.is_pale and not mark.is_own else colour)
                 )
-        return found
+        return labels
 
     def svg_document(self) -> str:
         """Return the SVG document."""
@@ -298,7 +298,7 @@ def _legend_places(names: Sequence[str]) -> Iterator[tuple[float, int]]:
 
 
 def _places_beside(mark: Mark, text: str) -> Iterator[Box]:
-    """Yield places for a label, the nearest first; from beside its mark to above it."""
+    """Yield places for a label, the nearest first; from next to its mark to above it."""
     width, height = _LETTER * len(text), _TEXT + 1.0
     for gap in (10.0,) if mark.is_pale and not mark.is_own else (10.0, 15.0, 22.0):
         for dx, dy in _DIRECTIONS:

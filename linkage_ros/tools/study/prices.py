@@ -161,19 +161,22 @@ def swinging_inputs(closure: Closure, frequency: float) -> list[Path]:
 
 def _closing_sizes(closure: Closure, centers: Sequence[float]) -> list[float]:
     """Return how far several inputs may go together from where they are, to both sides."""
-    units = [closure.scale if each.slider else 1.0 for each in closure.linkage.inputs]
+    units = [closure.scale if driven.slider else 1.0 for driven in closure.linkage.inputs]
     random = Random(0)
     parts = [[random.uniform(-1.0, 1.0) for _ in units] for _ in range(_PLACES)]
     size = _PART
     while size > _LEAST_PART:
         places = (
-            [c + size * unit * part for c, unit, part in zip(centers, units, one, strict=True)]
-            for one in parts
+            [
+                c + size * unit * part
+                for c, unit, part in zip(centers, units, parts_of_way, strict=True)
+            ]
+            for parts_of_way in parts
         )
         if all(closure.position(*place).status is Status.CLOSED for place in places):
             break
         size *= 0.5
-    # Beside the places may be others that do not close.
+    # Between the places may be others that do not close.
     return [0.8 * size * unit for unit in units]
 
 
@@ -240,10 +243,10 @@ def time_ticks(
     timed = [TimedScene(scene, feed) for scene in scenes]
     # Blocks of the same simulated time, so that motions that differ are compared where they are
     # the same.
-    rates = [one.rate for one in timed]
+    rates = [scene.rate for scene in timed]
     span = max(_BLOCK / max(rates), _SLOW_BLOCK / min(rates))
-    for one in timed:
-        one.block = round(span * one.rate)
+    for timed_scene in timed:
+        timed_scene.block = round(span * timed_scene.rate)
     clock, shuffle = thread_clock(), Random(0).shuffle
     order = list(range(len(timed)))
     rounds: list[Rounds] = [[] for _ in timed]
@@ -253,16 +256,16 @@ def time_ticks(
         durations = []
         for _ in range(3):  # The first block warms the caches
             begun = perf_counter()
-            for one in timed:
-                one.time_block(clock)
+            for timed_scene in timed:
+                timed_scene.time_block(clock)
             durations.append(perf_counter() - begun)
         wanted = seconds / min(durations)
         blocks = max(1, round(min(wanted / _ROUNDS, _LAP / span)))
         count = max(_ROUNDS, round(wanted / blocks))
         for done in range(count):
             times: list[list[float]] = [[] for _ in timed]
-            for one in timed:
-                one.begin()
+            for timed_scene in timed:
+                timed_scene.begin()
             for _ in range(blocks):
                 # A scene behind a slow one finds cold caches: the order changes.
                 shuffle(order)
@@ -272,18 +275,18 @@ def time_ticks(
                 if not done and process_time() - started > 0.5 * most:
                     blocks = len(times[0])
                     break
-            for found, blocks_of_scene in zip(rounds, times, strict=True):
-                found.append(blocks_of_scene)
+            for of_scene, blocks_of_scene in zip(rounds, times, strict=True):
+                of_scene.append(blocks_of_scene)
             gc.collect(0)
             if done + 1 >= _FEWEST_ROUNDS and process_time() - started > most:
                 break
     finally:
         if collecting:
             gc.enable()
-    for one in timed:
-        if not one.published:
+    for timed_scene in timed:
+        if not timed_scene.published:
             raise LinkageError(
-                one.scene.name,
+                timed_scene.scene.name,
                 'publishes nothing: there is nothing to measure',
                 'see that the linkage closes where the drive brings it',
             )
@@ -309,8 +312,8 @@ def price_scenes(
     """Return what ticks of other scenes cost more than those of a scene; see `time_ticks`."""
     own, *changed = time_ticks([scene, *others], seconds, feed, progress, most)
     return [
-        Price(subtract_times(times, own), other.rate or USUAL_RATE)
-        for times, other in zip(changed, others, strict=True)
+        Price(subtract_times(times, own), scene_with.rate or USUAL_RATE)
+        for times, scene_with in zip(changed, others, strict=True)
     ]
 
 
@@ -318,7 +321,7 @@ def subtract_times(rounds: Rounds, others: Rounds) -> Spread:
     """Return how much longer one takes than the other; both were measured in turns."""
     return _spread_of_rounds(
         [
-            [one - other for one, other in zip(*blocks, strict=True)]
+            [longer - shorter for longer, shorter in zip(*blocks, strict=True)]
             for blocks in zip(rounds, others, strict=True)
         ]
     )
@@ -372,11 +375,11 @@ def add_prices(
     if most < inf:
         begun = process_time()
         TimedScene(scene, feed).time_block(process_time)
-        each = (1.0 + _FEWEST_ROUNDS) * (process_time() - begun)
-        different = dict(islice(different.items(), max(1, int(most / each) - 1)))
+        seconds_each = (1.0 + _FEWEST_ROUNDS) * (process_time() - begun)
+        different = dict(islice(different.items(), max(1, int(most / seconds_each) - 1)))
     changed = [change_scene(scene, changes) for changes in different.values()]
-    found = price_scenes(scene, changed, seconds, feed, progress, most)
-    prices = dict(zip(different, found, strict=True))
+    prices_found = price_scenes(scene, changed, seconds, feed, progress, most)
+    prices = dict(zip(different, prices_found, strict=True))
     priced = []
     for row, knob in enumerate(knobs):
         settings = []

@@ -70,7 +70,7 @@ def measure_recording(
     rounds, settings = (1, [own]) if quick else (_ROUNDS, [own, *_other_periods(own)])
     closures = Pipeline(scene).closures
     runs: list[list[_RecordedRun]] = [[] for _ in settings]
-    lengths = [max(_SHORTEST, _LONGER * each.flush_period) for each in settings]
+    lengths = [max(_SHORTEST, _LONGER * setting.flush_period) for setting in settings]
     done, whole = 0.0, rounds * sum(lengths)
     with tempfile.TemporaryDirectory(prefix='recording_', dir=folder) as temporary:
         for index in alternate_order(range(len(settings)), rounds):
@@ -86,11 +86,11 @@ def measure_recording(
     return [
         RecordingLoss(
             f'record.flush_period: {setting.flush_period:g}',
-            max(run.stake for run in found),
-            Price(spread_of([run.per_tick for run in found]), rate),
-            sum(run.dropped for run in found),
+            max(run.stake for run in runs_of_setting),
+            Price(spread_of([run.per_tick for run in runs_of_setting]), rate),
+            sum(run.dropped for run in runs_of_setting),
         )
-        for setting, found in zip(settings, runs, strict=True)
+        for setting, runs_of_setting in zip(settings, runs, strict=True)
     ]
 
 

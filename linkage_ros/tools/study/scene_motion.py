@@ -155,15 +155,15 @@ def _commanded_motion(
     if like is None and moves_without_commands(motion, horizon):
         return motion._replace(note='no command comes')
     use, inputs = motion.scene_linkage.drive[1], motion.closure.linkage.inputs
-    uses = [use.for_input(given.joint) for given in inputs]
+    uses = [use.for_input(driven.joint) for driven in inputs]
     needed = [_needed_effort(motion)] if len(inputs) == 1 else _needed_efforts(motion)
     period = round(min(COMMAND_PERIOD, 0.5 * use.timeout) * NANOSECONDS)
     sines, said = [], []
-    for k, (given, own, effort) in enumerate(zip(inputs, uses, needed, strict=True)):
-        unit = motion.closure.scale if given.slider else 1.0
+    for k, (driven, own, effort) in enumerate(zip(inputs, uses, needed, strict=True)):
+        unit = motion.closure.scale if driven.slider else 1.0
         size, hertz = _commanded_size(own.motor, effort, unit), _COMMANDED / (1.0 + 0.25 * k)
         sines.append((size, tau * hertz))
-        units = {'effort': 'N' if given.slider else 'N·m', 'current': 'A', 'voltage': 'V'}
+        units = {'effort': 'N' if driven.slider else 'N·m', 'current': 'A', 'voltage': 'V'}
         unit_name = units[own.motor.command if own.motor else 'effort']
         said.append(f'a sine of {hertz:.3g} Hz and {size:.3g} {unit_name}')
     commands = [
@@ -193,14 +193,14 @@ def _needed_efforts(motion: LinkageMotion) -> list[float]:
     terms = build_drive(motion).motion
     terms = getattr(terms, 'moved', terms).terms
     mechanics, inputs = motion.context.mechanics, motion.closure.linkage.inputs
-    found = []
-    for k, given in enumerate(inputs):
+    efforts = []
+    for k, driven in enumerate(inputs):
         rubbing = zip(terms.slips, mechanics.dry_frictions, strict=True)
         friction = sum(abs(slip.levers[k]) * of.holding for slip, of in rubbing)
-        unit = motion.closure.scale if given.slider else 1.0
+        unit = motion.closure.scale if driven.slider else 1.0
         inertia = 1.0 / terms.mobility[k][k]
-        found.append(friction + 0.2 * abs(terms.bias[k]) + 2.0 * unit * inertia)
-    return found
+        efforts.append(friction + 0.2 * abs(terms.bias[k]) + 2.0 * unit * inertia)
+    return efforts
 
 
 def _needed_effort(motion: LinkageMotion) -> float:
@@ -211,10 +211,12 @@ def _needed_effort(motion: LinkageMotion) -> float:
     low, high = (
         min(max(end, start - tau), start + tau) for end in drive.actuation_for(None)[0].stops
     )
-    found = [terms for k in range(90) if (terms := equation(low + (high - low) * k / 90.0))]
-    least = min(terms.inertia for terms in found)
-    friction = max(terms.coulomb + terms.breakaway for terms in found)
-    weight = max(abs(terms.potential_slope) for terms in found)
+    terms_by_angle = [
+        terms for k in range(90) if (terms := equation(low + (high - low) * k / 90.0))
+    ]
+    least = min(terms.inertia for terms in terms_by_angle)
+    friction = max(terms.coulomb + terms.breakaway for terms in terms_by_angle)
+    weight = max(abs(terms.potential_slope) for terms in terms_by_angle)
     unit = motion.closure.scale if motion.closure.linkage.inputs[0].slider else 1.0
     return friction + 0.2 * weight + 2.0 * unit * least
 
@@ -249,20 +251,20 @@ def _samples_and_ticks(
     scene: Scene, motions: Sequence[LinkageMotion]
 ) -> Iterator[tuple[int, bytes]]:
     """Yield ticks, each with a sample; the last one again and again after the end of a bag."""
-    driven = [each for each in motions if each.scene_linkage.drive[1].is_measured]
-    if any(each.scene_linkage.instead_of_inputs for each in driven):
+    driven = [motion for motion in motions if motion.scene_linkage.drive[1].is_measured]
+    if any(motion.scene_linkage.instead_of_inputs for motion in driven):
         yield from turn_crank(scene, Pipeline(scene))
         return
     write = JointStateWriter(
-        [name for each in driven for name in each.scene_linkage.sampled_joints]
+        [name for motion in driven for name in motion.scene_linkage.sampled_joints]
     ).write
     period = 1e9 / (scene.rate or USUAL_RATE)
     known: list[Crank] = [((0.0,) * len(e.scene_linkage.sampled_joints),) * 2 for e in driven]
     number = 0
     while True:
         now = BEGIN + round(number * period)
-        found = [each.path(now - BEGIN) for each in driven if each.path]
-        known = [new or old for new, old in zip(found, known, strict=True)]
+        samples = [motion.path(now - BEGIN) for motion in driven if motion.path]
+        known = [new or old for new, old in zip(samples, known, strict=True)]
         values = [value for crank in known for value in crank[0]]
         rates = [rate for crank in known for rate in crank[1]]
         yield now, write(now, values, rates, (0.0,) * len(values))
@@ -273,21 +275,21 @@ def _commands_and_ticks(
     scene: Scene, motions: Sequence[LinkageMotion]
 ) -> Iterator[tuple[int, bytes]]:
     """Yield ticks, with the commands that have come since the last one."""
-    driven = [each for each in motions if each.scene_linkage.drive[1].gives_torque]
-    names = [name for each in driven for name in each.context.inputs_in_messages]
+    driven = [motion for motion in motions if motion.scene_linkage.drive[1].gives_torque]
+    names = [name for motion in driven for name in motion.context.inputs_in_messages]
     write = JointStateWriter(names).write
     zeros = (0.0,) * len(names)
     period = 1e9 / scene.rate
     number, next_ones = 0, [0] * len(driven)
-    newest = [[0.0] * len(each.context.inputs_in_messages) for each in driven]
+    newest = [[0.0] * len(motion.context.inputs_in_messages) for motion in driven]
     while True:
         elapsed = round(number * period)
         fresh = False
-        for k, each in enumerate(driven):
-            while next_ones[k] < len(each.commands) and (
-                each.commands[next_ones[k]].time <= elapsed
+        for k, motion in enumerate(driven):
+            while next_ones[k] < len(motion.commands) and (
+                motion.commands[next_ones[k]].time <= elapsed
             ):
-                commanded = zip(each.commands[next_ones[k]].efforts, newest[k], strict=True)
+                commanded = zip(motion.commands[next_ones[k]].efforts, newest[k], strict=True)
                 newest[k] = [old if new is None else new for new, old in commanded]
                 next_ones[k] += 1
                 fresh = True
@@ -331,14 +333,14 @@ def _follow_samples(
         number = bisect_right(stamps, time) - 1
         if number < 0 or number + 1 >= len(stamps):
             return None
-        one, other = samples[number], samples[number + 1]
-        length = (other.stamp - one.stamp) * 1e-9
+        before, after = samples[number], samples[number + 1]
+        length = (after.stamp - before.stamp) * 1e-9
         if length > gap:
             return None
         part = (time - stamps[number]) * 1e-9 / length
-        ends = zip(one.values, one.rates, other.values, other.rates, strict=True)
-        found = [_evaluate_cubic(part, length, *four) for four in ends]
-        return tuple(value for value, _ in found), tuple(rate for _, rate in found)
+        ends = zip(before.values, before.rates, after.values, after.rates, strict=True)
+        states = [_evaluate_cubic(part, length, *four) for four in ends]
+        return tuple(value for value, _ in states), tuple(rate for _, rate in states)
 
     note = f'the crank moves as recorded in {bag.path.name}'
     length = stamps[-1] * 1e-9
@@ -363,7 +365,7 @@ def _samples_of(motion: LinkageMotion, bag: Bag, topic: str) -> list[_Sample]:
     else:
         use = TopicDrive(max_age=use.max_age)
     topic = topic or str(read_raw_metadata(bag).get('crank_topic') or '')
-    of_type = {each.name for each in bag.topics if each.type == JOINT_STATE_TYPE}
+    of_type = {topic.name for topic in bag.topics if topic.type == JOINT_STATE_TYPE}
     received: dict[str, list[tuple[int, Any]]] = {}
     for heard, log_time, _, data in bag.messages():
         if heard in of_type and (heard == topic or not topic):
@@ -372,18 +374,18 @@ def _samples_of(motion: LinkageMotion, bag: Bag, topic: str) -> list[_Sample]:
                 received.setdefault(heard, []).append((log_time, sample))
     most = max(received.values(), key=len, default=[])
     drive = sample_inputs(use, True, motion.closure.linkage.inputs)
-    found: list[_Sample] = []
-    for log_time, sample in sorted(most, key=lambda one: one[0]):
+    samples: list[_Sample] = []
+    for log_time, sample in sorted(most, key=lambda entry: entry[0]):
         if drive.offer(sample, log_time) is None and drive.sample is not None:
             stamp, values, rates, _ = drive.sample
-            if not found or stamp > found[-1].stamp:
-                found.append(_Sample(stamp, log_time, values, rates))
-    if len(found) < 2:
+            if not samples or stamp > samples[-1].stamp:
+                samples.append(_Sample(stamp, log_time, values, rates))
+    if len(samples) < 2:
         names = list_names(motion.context.inputs_in_messages)
         raise BagError(
             bag.path, f'holds no motion of {names}', 'name a bag with samples of the crank'
         )
-    return found
+    return samples
 
 
 def _evaluate_cubic(
@@ -402,7 +404,7 @@ def _follow_commands(motion: LinkageMotion, bag: Bag) -> LinkageMotion:
     """Return the motion of a torque drive by the commands of a bag, as they came; or by none."""
     read = motion.scene_linkage.drive[1].reader(motion.context)
     topic = read_raw_metadata(bag).get('crank_topic')
-    of_type = {each.name for each in bag.topics if each.type == JOINT_STATE_TYPE}
+    of_type = {topic.name for topic in bag.topics if topic.type == JOINT_STATE_TYPE}
     heard: dict[str, list[Command]] = {}
     begin = end = None
     for name, log_time, _, data in bag.messages():
@@ -419,7 +421,7 @@ def _follow_commands(motion: LinkageMotion, bag: Bag) -> LinkageMotion:
     most = max(heard.values(), key=len, default=[])
     most.sort(key=attrgetter('time'))
     return motion._replace(
-        commands=[each._replace(time=each.time - begin) for each in most],
+        commands=[command._replace(time=command.time - begin) for command in most],
         length=(end - begin) * 1e-9,
         note=f'{len(most) or "no"} commands come, as recorded in {bag.path.name}',
     )

@@ -11,7 +11,7 @@ The error of solving the loops, and what other ways to solve them cost.
 
 The exact joints are from `linkage_ros.tools.study.enclosure`: balls that are proved to hold
 the solution. The states are from the scene's own motion. What a scene cannot ask for stands
-beside the closed form for comparison: numbers of 32 bits, the textbook form, Newton's method, a
+and, to compare with the closed form: numbers of 32 bits, the textbook form, Newton's method, a
 spline through a table, thirty digits; and of links that close only together the steps of Newton's
 method, and the size of the cells that these start from. Newton's method is on the constraint
 equations, in the places and turns of the links: it shares no formula with the closed form.
@@ -137,7 +137,7 @@ def measure_solving(
     worst = JointError(
         sqrt(sum(e.rms**2 for e in errors) / len(errors)), max(e.worst for e in errors)
     )
-    times_of = time_in_turn([one for _, _, one in candidates], seconds)
+    times_of = time_in_turn([candidate for _, _, candidate in candidates], seconds)
     settings = [
         Setting(label, error, Price(spread.scale(1e6), rate), None)
         for (label, error, _), spread in zip(candidates, times_of, strict=True)
@@ -197,16 +197,16 @@ def compare_solver(
 ) -> tuple[JointError, int]:
     """Return the error of a method, and at how many states it has no answer or a wrong one."""
     limits = far or [_FAR] * len(states)
-    found: list[float] = []
+    errors: list[float] = []
     for state, balls, limit in zip(states, exact, limits, strict=True):
         joints = solve(*state)
         error = largest_distance(closure, joints, balls) if len(joints) else inf
         if error <= limit:
-            found.append(error)
-    if not found:
+            errors.append(error)
+    if not errors:
         return JointError(inf, inf), len(states)
-    rms = sqrt(sum(error * error for error in found) / len(found))
-    return JointError(rms, max(found)), len(states) - len(found)
+    rms = sqrt(sum(error * error for error in errors) / len(errors))
+    return JointError(rms, max(errors)), len(states) - len(errors)
 
 
 def largest_distance(closure: Closure, joints: Sequence[Any], balls: Sequence[Any]) -> float:
@@ -339,9 +339,9 @@ class _RoundedConstraints:
             for row, products in enumerate(exact.constraints)
             for (factor, *_), i, j in products
         ]
-        rows, factors, one, other = zip(*terms, strict=True)
+        rows, factors, first, other = zip(*terms, strict=True)
         self._rows, self._factors = np.array(rows), np.array(factors)
-        self._one, self._other = np.array(one), np.array(other)
+        self._one, self._other = np.array(first), np.array(other)
         # The places of both derivatives of each product in the flat Jacobian.
         width = exact.count + 1
         self._places = np.concatenate(
@@ -350,9 +350,9 @@ class _RoundedConstraints:
 
     def newton_step(self, unknowns: Any) -> Any:
         """Return a step of Newton's method; the first unknown is 1 and stays."""
-        one, other = unknowns[self._one], unknowns[self._other]
-        errors = np.bincount(self._rows, self._factors * one * other, self._count)
-        slopes = np.concatenate([self._factors * other, self._factors * one])
+        first, second = unknowns[self._one], unknowns[self._other]
+        errors = np.bincount(self._rows, self._factors * first * second, self._count)
+        slopes = np.concatenate([self._factors * second, self._factors * first])
         width = self._count + 1
         jacobian = np.bincount(self._places, slopes, self._count * width)
         return np.linalg.solve(jacobian.reshape(-1, width)[:, 1:], errors)
@@ -378,7 +378,7 @@ def solve_by_newton(closure: Closure, tolerance: float) -> Callable[..., Sequenc
 
     def start_behind(inputs: Sequence[float], exact: ExactConstraints) -> Any:
         """Return the unknowns of the closure at inputs that differ, on the side that closes."""
-        units = [closure.scale if each.slider else 1.0 for each in linkage.inputs]
+        units = [closure.scale if driven.slider else 1.0 for driven in linkage.inputs]
         for side in (-_BEHIND, _BEHIND, 0.0):
             near = [x + side * unit for x, unit in zip(inputs, units, strict=True)]
             if closure.position(*near).joints:

@@ -71,10 +71,10 @@ class SpatialConstraints(ExactConstraints):
         self.constraints = [*self._link_constraints()]
         on_axes = {(point, *pair) for point, *pair in linkage.shared_points(on_axes=True)}
         for point, links in self._carriers.items():
-            one, *others = links
+            first, *others = links
             for other in others:
-                if not {(point, one, other), (point, other, one)} & on_axes:
-                    self._add_ball(self._point_form(point, one), self._point_form(point, other))
+                if not {(point, first, other), (point, other, first)} & on_axes:
+                    self._add_ball(self._point_form(point, first), self._point_form(point, other))
         for shared in rods.values():
             between = self._span_form(*shared)
             length = self._square_distance(*shared)
@@ -89,8 +89,8 @@ class SpatialConstraints(ExactConstraints):
     def _link_constraints(self) -> Iterator[list[Term]]:
         for link in self._links:
             rows = enumerate(self._rows(link))
-            for (i, one), (j, other) in combinations_with_replacement(rows, 2):
-                products = [constant_term(1, *pair) for pair in zip(one, other, strict=True)]
+            for (i, first), (j, second) in combinations_with_replacement(rows, 2):
+                products = [constant_term(1, *pair) for pair in zip(first, second, strict=True)]
                 yield [*products, constant_term(-int(i == j), 0, 0)]
 
     def initial_unknowns(self, closure: SpaceClosure, inputs: Sequence[float]) -> list[Any]:
@@ -159,8 +159,8 @@ class SpatialConstraints(ExactConstraints):
 
     # Constraints
 
-    def _add_ball(self, one: VectorForm, other: VectorForm) -> None:
-        for row in _difference(one, other):
+    def _add_ball(self, first: VectorForm, second: VectorForm) -> None:
+        for row in _difference(first, second):
             self.constraints.append([constant_term(c, 0, k) for k, c in row])
 
     def _add_pair(self, name: str) -> None:
@@ -180,18 +180,18 @@ class SpatialConstraints(ExactConstraints):
         linkage = self._linkage
         if name in linkage.struts:
             between, size = self._span_form(*linkage.struts[name]), self._scale * self._scale
-            given = (-x * x / size, -2 * x * v / size, -2 * (v * v + x * a) / size)
-            self.constraints.append([*_dot(between, between), (given, 0, 0)])
+            constant = (-x * x / size, -2 * x * v / size, -2 * (v * v + x * a) / size)
+            self.constraints.append([*_dot(between, between), (constant, 0, 0)])
             return
         joint, (along, b, c) = linkage.pair_joints[name], self._across[name]
         moved = x - arb(joint.value)
         if name in linkage.slides:
-            given = tuple(-part / self._scale for part in (moved, v, a))
+            constant = tuple(-part / self._scale for part in (moved, v, a))
             slid = _dot(self._direction_form(joint.parent, along), self._offset(joint))
-            self.constraints.append([*slid, (given, 0, 0)])
+            self.constraints.append([*slid, (constant, 0, 0)])
             return
-        one = acb(moved.cos(), moved.sin())
-        turns = (one, one * acb(0, v), one * acb(-v * v, a))
+        unit = acb(moved.cos(), moved.sin())
+        turns = (unit, unit * acb(0, v), unit * acb(-v * v, a))
         turned = self._direction_form(joint.child, b)
         terms: list[Term] = []
         for way, parts in ((c, [t.real for t in turns]), (b, [-t.imag for t in turns])):
@@ -222,13 +222,13 @@ class SpatialConstraints(ExactConstraints):
     def _point_form(self, point: str, link: str = '') -> VectorForm:
         return self._place_form(link or self._carriers[point][0], self._linkage.points[point])
 
-    def _span_form(self, one: str, other: str) -> VectorForm:
-        return _difference(self._point_form(one), self._point_form(other))
+    def _span_form(self, start: str, end: str) -> VectorForm:
+        return _difference(self._point_form(start), self._point_form(end))
 
-    def _square_distance(self, one: str, other: str) -> Any:
+    def _square_distance(self, start: str, end: str) -> Any:
         """Return the square of the distance of two points in the pose."""
         points = self._linkage.points
-        pairs = zip(points[one], points[other], strict=True)
+        pairs = zip(points[start], points[end], strict=True)
         return sum(((arb(a) - arb(b)) ** 2 for a, b in pairs), arb(0)) / self._scale**2
 
     def _offset(self, joint: SpatialJoint) -> VectorForm:
@@ -249,20 +249,20 @@ def _unit(vector: Sequence[Any]) -> tuple[Any, ...]:
     return tuple(part / length for part in vector)
 
 
-def _cross(one: Sequence[Any], other: Sequence[Any]) -> tuple[Any, ...]:
-    (a, b, c), (d, e, f) = one, other
+def _cross(first: Sequence[Any], second: Sequence[Any]) -> tuple[Any, ...]:
+    (a, b, c), (d, e, f) = first, second
     return b * f - c * e, c * d - a * f, a * e - b * d
 
 
-def _dot(one: VectorForm, other: VectorForm) -> list[Term]:
+def _dot(first: VectorForm, second: VectorForm) -> list[Term]:
     return [
         constant_term(c * d, i, j)
-        for a, b in zip(one, other, strict=True)
+        for a, b in zip(first, second, strict=True)
         for i, c in a
         for j, d in b
     ]
 
 
-def _difference(one: VectorForm, other: VectorForm) -> VectorForm:
-    x, y, z = ([*a, *((k, -c) for k, c in b)] for a, b in zip(one, other, strict=True))
+def _difference(first: VectorForm, second: VectorForm) -> VectorForm:
+    x, y, z = ([*a, *((k, -c) for k, c in b)] for a, b in zip(first, second, strict=True))
     return x, y, z
