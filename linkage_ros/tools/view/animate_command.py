@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Animate a linkage through the range of its first input, beside its joints.
+Animate a linkage through the range of its first input, next to its joints.
 
 A turn begins at the usual pose; a limited range is shown there and back. A spatial linkage is seen
 from a camera, as linkage draw sees it.
@@ -64,10 +64,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Animate it."""
-    given = Path(arguments.file)
-    file = output_or(arguments, Path(f'{given.stem}.gif'))
+    source = Path(arguments.file)
+    file = output_or(arguments, Path(f'{source.stem}.gif'))
     check_kind(file)
-    motion = _load_motion(arguments, given)
+    motion = _load_motion(arguments, source)
     with show_progress('pictures') as advance:
 
         def report_picture(done: int, of: int) -> None:
@@ -80,9 +80,9 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     return 0
 
 
-def _load_motion(arguments: argparse.Namespace, given: Path) -> AnimatedMotion:
+def _load_motion(arguments: argparse.Namespace, source: Path) -> AnimatedMotion:
     content = linkage_content(named_file(arguments.file, 'linkages'), robot_of(arguments))
-    closure: Any = read_any_closure(content, given.stem)
+    closure: Any = read_any_closure(content, source.stem)
     camera = camera_of(arguments, closure)
     shown = prepare_view(closure, usual_inputs(closure))._replace(length=content.units.length)
-    return range_motion(shown, given.stem, arguments.seconds, camera)
+    return range_motion(shown, source.stem, arguments.seconds, camera)

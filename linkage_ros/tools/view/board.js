@@ -9,7 +9,7 @@ const Board = (() => {
   const HIGH = 12; // pixels: the letters of a name
   const PALE = 0.22;
   const LOOKED_AT = 72; // poses, to see how far a linkage reaches
-  const ALONG = 9; // pixels beside a bar that are the bar's
+  const ALONG = 9; // pixels next to a bar that are the bar's
 
   /** Return a text in lines that are short enough for a narrow picture. */
   function folded(text) {

@@ -119,22 +119,25 @@ class BagDifferences:
         """Return times in [s], and the least and greatest difference in each interval."""
         self._flush_rows()
         assert self._curves is not None
-        found = self._curves.build_intervals()
-        lows, highs = np.fmin(found.first, found.second), np.fmax(found.first, found.second)
-        return found.begins * 1e-9, lows, highs
+        intervals = self._curves.build_intervals()
+        lows, highs = (
+            np.fmin(intervals.first, intervals.second),
+            np.fmax(intervals.first, intervals.second),
+        )
+        return intervals.begins * 1e-9, lows, highs
 
     def interpolate(self, before: TimedState, after: TimedState, time: int) -> Mapping[Key, float]:
         """Return the values at a time between two states, in [ns]."""
         if after.time == time or after.time == before.time:
             return after.values
         share = (time - before.time) / (after.time - before.time)
-        found = {}
+        values = {}
         for key, value in before.values.items():
             step = after.values.get(key, nan) - value
             if self._wrapped and self._is_angle(key) and abs(step) > pi:
                 step = remainder(step, tau)
-            found[key] = value + share * step
-        return found
+            values[key] = value + share * step
+        return values
 
     def _is_angle(self, key: Key) -> bool:
         return key[1] == POSITION and self._turning.get(key[0], True)
@@ -176,7 +179,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         'other': str(arguments.other),
         'compared': differences.compared,
         'seconds': differences.end * 1e-9,
-        'damage': [each.damage for each in readings if each.damage],
+        'damage': [reading.damage for reading in readings if reading.damage],
         'stopped': stop.is_set(),
         'joints': deviations_account(differences.deviations, turning),
     }
@@ -264,7 +267,7 @@ def _draw_differences(
     times, *ends = differences.difference_curves()
     # A curve begins anew where states are missing.
     gaps = np.flatnonzero(is_after_gap(times, steady=True))
-    times, lows, highs = (np.insert(each, gaps, np.nan, axis=0) for each in (times, *ends))
+    times, lows, highs = (np.insert(values, gaps, np.nan, axis=0) for values in (times, *ends))
     curves = [
         Curve(
             name,
@@ -280,7 +283,7 @@ def _draw_differences(
         (axes_of,) = stacked_axes(figure.add_gridspec, [curves])
         lines = plot_joints(axes_of, curves, degrees_x=False, length=length)
         for column, curve in enumerate(curves):
-            low, high = (np.degrees(each) if curve.turning else each for each in (lows, highs))
+            low, high = (np.degrees(bound) if curve.turning else bound for bound in (lows, highs))
             axes_of[curve.turning].fill_between(
                 times,
                 low[:, column],

@@ -48,7 +48,7 @@ _REPLACED = {'model': 'edit', 'edit': 'edit', 'read': 'read'}
 """Requests that a newer one of the same kind and page replaces while they wait."""
 
 _SLOW = ('export',)
-"""Requests beside which a drag goes on, in a process of their own."""
+"""Requests during which a drag goes on, in a process of their own."""
 
 
 class Conversation:

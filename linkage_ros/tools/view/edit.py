@@ -120,9 +120,13 @@ def pin_of(error: LinkageError, text: str) -> str | None:
     return next((part for part in reversed(str(where).split('.')) if part in names), None)
 
 
-def _shown_linkage(closure: PlanarClosure, given: Any) -> _ShownLinkage:
+def _shown_linkage(closure: PlanarClosure, inputs_sent: Any) -> _ShownLinkage:
     count = len(closure.linkage.inputs)
-    inputs = _default_inputs(closure) if given is None else read_numbers('inputs', given, count)
+    inputs = (
+        _default_inputs(closure)
+        if inputs_sent is None
+        else read_numbers('inputs', inputs_sent, count)
+    )
     position = closure.position(*inputs)
     if not position.status.has_pose:
         inputs = _default_inputs(closure)
@@ -130,8 +134,8 @@ def _shown_linkage(closure: PlanarClosure, given: Any) -> _ShownLinkage:
         if not position.status.has_pose:  # several inputs
             raise _open_error()
     frames: dict[str, tuple[complex, float]] = {GROUND: (0j, 0.0)}
-    found = closure.link_frames
-    frames |= dict(zip(found.links, found.frames_at(position), strict=True))
+    link_frames = closure.link_frames
+    frames |= dict(zip(link_frames.links, link_frames.frames_at(position), strict=True))
     points = closure.points(position)
     return _ShownLinkage(
         closure, inputs, frames, {point: place for (_, point), place in points.items()}
@@ -170,19 +174,19 @@ def _move_pin(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
         place, angle = shown.frames[link]
         frame = _own_frame(linkage, link, pin)
         if frame:
-            one, other = (pins[name] for name in frame)
-            if one == other:
+            start, end = (pins[name] for name in frame)
+            if start == end:
                 reason = f'{frame[0]} and {frame[1]} of {link} would be in one place'
                 raise LinkageError(pin, reason, 'move it elsewhere')
             # The turn nearest to the old one: an input keeps its whole turns.
-            new = angle + (phase(other - one) - angle + tau / 2) % tau - tau / 2
+            new = angle + (phase(end - start) - angle + tau / 2) % tau - tau / 2
             turned[link] = new - angle
             if link in masses:
-                longer = abs(other - one) / points[frame[1]][0]
+                longer = abs(end - start) / points[frame[1]][0]
                 x, y = masses[link].center
                 centre = (_rounded_value(shown, x * longer), y)
                 masses[link] = replace(masses[link], center=centre)
-            place, angle = one, new
+            place, angle = start, new
         links[link] = {
             name: at
             if not frame and name != pin
@@ -190,10 +194,10 @@ def _move_pin(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
             for name, at in points.items()
         }
     inputs = [
-        _updated_slide(shown, given.slider, pins, value)
-        if given.slider
-        else value + turned.get(given.child, 0.0) - turned.get(given.parent, 0.0)
-        for given, value in zip(linkage.inputs, shown.inputs, strict=True)
+        _updated_slide(shown, driven.slider, pins, value)
+        if driven.slider
+        else value + turned.get(driven.child, 0.0) - turned.get(driven.parent, 0.0)
+        for driven, value in zip(linkage.inputs, shown.inputs, strict=True)
     ]
     changed = replace(linkage, links=links, masses=masses)
     if linkage.pose is not None:
@@ -210,9 +214,9 @@ def _own_frame(linkage: Linkage, link: str, pin: str) -> tuple[str, str] | None:
         return None
     if any(link in (slider.along, slider.block) for slider in linkage.sliders.values()):
         return None  # its frame also has the line of a slider
-    one, other = points[:2]
-    (x, y), (u, v) = linkage.links[link][one], linkage.links[link][other]
-    return (one, other) if x == y == v == 0.0 < u and pin in (one, other) else None
+    origin, on_axis = points[:2]
+    (x, y), (u, v) = linkage.links[link][origin], linkage.links[link][on_axis]
+    return (origin, on_axis) if x == y == v == 0.0 < u and pin in (origin, on_axis) else None
 
 
 def _on_axis(
@@ -265,25 +269,25 @@ def _updated_slide(
 
 def _set_length(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
     """Move a point of a link along the line to another one, so that they are so far apart."""
-    given = _read_mapping('length', edit)
+    content = _read_mapping('length', edit)
     linkage = shown.closure.linkage
-    link, points = _read_link(linkage, given)
-    one, other = (_checked_name(key, given.get(key), points) for key in ('from', 'to'))
-    (length,) = read_numbers('value', [given.get('value')], 1)
-    start, end = complex(*points[one]), complex(*points[other])
+    link, points = _read_link(linkage, content)
+    first, second = (_checked_name(key, content.get(key), points) for key in ('from', 'to'))
+    (length,) = read_numbers('value', [content.get('value')], 1)
+    start, end = complex(*points[first]), complex(*points[second])
     if length <= 0.0 or start == end:
         raise LinkageError(
-            f'links.{link}.{other}', f'{length:g} m is not a length', 'type one above 0'
+            f'links.{link}.{second}', f'{length:g} m is not a length', 'type one above 0'
         )
     to = start + (end - start) * (length / abs(end - start))
-    return _place_point(shown, link, other, (to.real, to.imag))
+    return _place_point(shown, link, second, (to.real, to.imag))
 
 
 def _edit_place(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
-    given = _read_mapping('place', edit)
-    link, points = _read_link(shown.closure.linkage, given)
-    point = _checked_name('point', given.get('point'), points)
-    x, y = read_numbers('at', given.get('at'), 2)
+    content = _read_mapping('place', edit)
+    link, points = _read_link(shown.closure.linkage, content)
+    point = _checked_name('point', content.get('point'), points)
+    x, y = read_numbers('at', content.get('at'), 2)
     return _place_point(shown, link, point, (x, y))
 
 
@@ -296,13 +300,13 @@ def _place_point(
 
 
 def _trace_point(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
-    given = _read_mapping('trace', edit)
+    content = _read_mapping('trace', edit)
     linkage = shown.closure.linkage
-    link, points = _read_link(linkage, given)
-    x, y = read_numbers('at', given.get('at'), 2)
+    link, points = _read_link(linkage, content)
+    x, y = read_numbers('at', content.get('at'), 2)
     taken = {*links_by_point(linkage.links), *linkage.sliders, *linkage.links}
     free = (f'P{index or ""}' for index in range(len(taken) + 1))
-    name = given.get('name', next(name for name in free if name not in taken))
+    name = content.get('name', next(name for name in free if name not in taken))
     if not isinstance(name, str) or name in taken:
         raise LinkageError(
             'name', f'{quote(name)} is taken, or is not a name', 'send another name'
@@ -328,9 +332,9 @@ def _untrace_point(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageCha
 
 def _choose_input(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
     """Drive another link on the ground; the joint that it had is published no more."""
-    given = _read_mapping('input', edit)
+    content = _read_mapping('input', edit)
     linkage = shown.closure.linkage
-    link, points = _read_link(linkage, given)
+    link, points = _read_link(linkage, content)
     if len(linkage.inputs) != 1:
         raise LinkageError('input', 'this linkage has several', 'change them in the file')
     (old,) = linkage.inputs
@@ -361,13 +365,13 @@ def _choose_input(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChan
 def _choose_side(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
     linkage = shown.closure.linkage
     possible = assembly_sides(shown.closure.structure)
-    given = _read_mapping('side', edit)
-    for key, side in given.items():
+    chosen = _read_mapping('side', edit)
+    for key, side in chosen.items():
         _checked_name('side', key, possible)
         if side not in possible[key]:
             remedy = f'choose {" or ".join(possible[key])}'
             raise LinkageError(f'assembly.{key}', f'{quote(side)} is not one of its sides', remedy)
-    sides: Any = {**written_sides(shown.closure), **given}
+    sides: Any = {**written_sides(shown.closure), **chosen}
     return _LinkageChange(
         replace(without_drawn_pose(linkage, shown.closure.structure), assembly=sides)
     )
@@ -403,9 +407,9 @@ def _in_pose(
     best, nearest = replace(linkage, assembly=written), float('inf')
     for chosen in islice(product(*own), _MOST_ASSEMBLIES):
         assembly: dict[str, Any] = dict(zip(sides, chosen, strict=True))
-        one = replace(linkage, assembly=assembly)
+        candidate = replace(linkage, assembly=assembly)
         try:
-            closure = PlanarClosure(one)
+            closure = PlanarClosure(candidate)
             position = closure.position(*inputs)
             points = closure.points(position) if position.status.has_pose else {}
         except DefinitionError:
@@ -414,23 +418,23 @@ def _in_pose(
             continue
         far = max(abs(place - pins[point]) for (_, point), place in points.items())
         if far < nearest:
-            best, nearest = one, far
+            best, nearest = candidate, far
         if far < _SAME * scale:
             break
     return best
 
 
 def _read_mapping(key: str, edit: Mapping[str, Any]) -> Mapping[str, Any]:
-    given = edit[key]
-    if not isinstance(given, dict):
-        raise LinkageError(key, f'{quote(given)} is not an object', 'send an object')
-    return given
+    content = edit[key]
+    if not isinstance(content, dict):
+        raise LinkageError(key, f'{quote(content)} is not an object', 'send an object')
+    return content
 
 
 def _read_link(
-    linkage: Linkage, given: Mapping[str, Any]
+    linkage: Linkage, content: Mapping[str, Any]
 ) -> tuple[str, Mapping[str, tuple[float, float]]]:
-    link = _checked_name('link', given.get('link'), linkage.links)
+    link = _checked_name('link', content.get('link'), linkage.links)
     return link, linkage.links[link]
 
 

@@ -100,13 +100,13 @@ class FollowedRun(NamedTuple):
     def _link_frames(self, known: Mapping[str, float]) -> list[float] | None:
         """Return place and angle of the frame of each link; None if they are unknown."""
         values = {name: np.array([value]) for name, value in known.items()}
-        found = link_poses(
+        poses = link_poses(
             self.closure, self.drawn_linkage.prefix, values, self.drawn_linkage.input_names
         )
-        if not set(self.model['links']) <= set(found.links):
+        if not set(self.model['links']) <= set(poses.links):
             return None
-        order = [found.links.index(link) for link in self.model['links']]
-        frames = found.frames[0][order]
+        order = [poses.links.index(link) for link in self.model['links']]
+        frames = poses.frames[0][order]
         return frames.ravel().tolist() if np.isfinite(frames).all() else None
 
 
@@ -125,7 +125,7 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
         model = model_of(closure, scene.name)
     except (ValueError, ArithmeticError, MalformedError) as error:
         raise LinkageError(topic, f'is not valid: {quote(str(error))}', 'name another') from None
-    turned = next((each for each in scene.linkages if each.drive[0] in _BY_TOPIC), None)
+    turned = next((linkage for linkage in scene.linkages if linkage.drive[0] in _BY_TOPIC), None)
     if not account.crank_topic:
         turned = None
     model |= {'live': _beside_model(scene, closure, turned)}
@@ -135,15 +135,15 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
 def _beside_model(
     scene: Scene, closure: PlanarClosure, topic_driven: SceneLinkage | None
 ) -> dict[str, Any]:
-    """Return what a page shows of a scene beside the model of its first linkage."""
+    """Return what a page shows of a scene next to the model of its first linkage."""
     shown = scene.linkages[0]
     cranks: list[list[float] | None] = []
-    for given in closure.linkage.inputs:
+    for driven in closure.linkage.inputs:
         # A crank on the ground is turned by the mouse about its pin.
-        points = closure.linkage.links.get(given.child, {})
+        points = closure.linkage.links.get(driven.child, {})
         ground = closure.linkage.links[GROUND]
         pivots = [name for name in points if name in ground]
-        if given.unit != 'rad' or given.parent != GROUND or not pivots:
+        if driven.unit != 'rad' or driven.parent != GROUND or not pivots:
             cranks.append(None)
             continue
         reach = max(dist(point, points[pivots[0]]) for point in points.values())
@@ -174,14 +174,17 @@ def _range_of_effort(closure: PlanarClosure) -> float:
 def diagnostics_content(statuses: Sequence[DiagnosticStatus]) -> dict[str, Any]:
     """Return what the newest diagnostics say of a node, as a page gets it."""
     values = {
-        _task_name(status): {each.key: each.value for each in status.values} for status in statuses
+        _task_name(status): {value.key: value.value for value in status.values}
+        for status in statuses
     }
     tick, recording = values.get('tick', {}), values.get('recording', {})
     return {
         'ticks': tick.get('Actual frequency (Hz)', ''),
         'late': tick.get('Late by more than a period', ''),
         'lost': tick.get('Lost ticks', ''),
-        'lateness': [tick.get(f'Lateness {each} (us)', '') for each in ('p50', 'p99', 'max')],
+        'lateness': [
+            tick.get(f'Lateness {quantity} (us)', '') for quantity in ('p50', 'p99', 'max')
+        ],
         'diagnostics': [
             [status.level[0], f'{_task_name(status)}: {status.message}'] for status in statuses
         ],

@@ -21,7 +21,7 @@ const Motion = (() => {
     /**
      * Return the pose at inputs, between the two nearest; null where there is none.
      *
-     * Undefined where none is known at all with these inputs beside the first one.
+     * Undefined where none is known at all with these inputs and any first one.
      */
     at([input, ...others]) {
       const poses = this.poses.filter(({ inputs }) => (

@@ -123,12 +123,12 @@ def _make_value(value: Any, units: Units, unit: str) -> Any:
 
     if isinstance(value, dict):
         made = CommentedMap(
-            {key: _make_value(one, units, _UNITS.get(key, unit)) for key, one in value.items()}
+            {key: _make_value(item, units, _UNITS.get(key, unit)) for key, item in value.items()}
         )
         made.fa.set_flow_style()
         return made
     if isinstance(value, list):
-        listed = CommentedSeq([_make_value(one, units, unit) for one in value])
+        listed = CommentedSeq([_make_value(item, units, unit) for item in value])
         listed.fa.set_flow_style()
         return listed
     if isinstance(value, str):
@@ -142,15 +142,15 @@ def _rewrite_shorthand(
 ) -> bool:
     """Write lengths and side into a shorthand; return whether that is all that changed."""
     lengths = {
-        key: dist(after.links[link][one], after.links[link][other])
-        for key, (link, one, other) in _SHORT_LENGTHS[kind].items()
-        if {one, other} <= {*after.links.get(link, ())}
+        key: dist(after.links[link][start], after.links[link][end])
+        for key, (link, start, end) in _SHORT_LENGTHS[kind].items()
+        if {start, end} <= {*after.links.get(link, ())}
     }
     if not lengths.keys() >= _SHORT_LENGTHS[kind].keys():
         return False
     old = {
-        key: dist(before.links[link][one], before.links[link][other])
-        for key, (link, one, other) in _SHORT_LENGTHS[kind].items()
+        key: dist(before.links[link][start], before.links[link][end])
+        for key, (link, start, end) in _SHORT_LENGTHS[kind].items()
     }
     for key, value in lengths.items():
         if value != old[key]:
@@ -168,8 +168,8 @@ def _is_written(node: Any, kind: str, linkage: Linkage, units: Units) -> bool:
 
     written = StringIO()
     YAML().dump({'units': units.length, 'angles': units.angle, kind: node}, written)
-    found, _ = written_linkage(parse_yaml(written.getvalue().encode(), kind))
-    return found.links == linkage.links and found.inputs == linkage.inputs
+    reread, _ = written_linkage(parse_yaml(written.getvalue().encode(), kind))
+    return reread.links == linkage.links and reread.inputs == linkage.inputs
 
 
 def _top_comment(text: str) -> list[str]:

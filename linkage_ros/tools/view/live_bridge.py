@@ -190,7 +190,9 @@ class LiveBridge:
 
         def stop_listening() -> None:
             with self._lock:
-                self._listeners = [each for each in self._listeners if each is not heard]
+                self._listeners = [
+                    listener for listener in self._listeners if listener is not heard
+                ]
 
         return stop_listening
 
@@ -328,8 +330,8 @@ class LiveBridge:
         if run.topic_driven is not None:
             self._hand = HandCrank(
                 [
-                    given.unit == 'rad' and not isfinite(given.limits.high - given.limits.low)
-                    for given in run.topic_driven.linkage.inputs
+                    driven.unit == 'rad' and not isfinite(driven.limits.high - driven.limits.low)
+                    for driven in run.topic_driven.linkage.inputs
                 ]
             )
 
@@ -348,7 +350,7 @@ class LiveBridge:
                 self._publish_node()
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        own = [each for each in message.status if each.name.startswith(f'{self.name}: ')]
+        own = [status for status in message.status if status.name.startswith(f'{self.name}: ')]
         if own:
             self._statuses, self._last_heard = own, monotonic()
             self._lifecycle = ''
@@ -570,10 +572,10 @@ def _take_all(subscription: Any) -> list[bytes]:
         return []
     taken: list[bytes] = []
     while len(taken) < _NEWEST_QOS.depth:
-        found = subscription.handle.take_message(JointState, True)
-        if found is None:
+        taken_message = subscription.handle.take_message(JointState, True)
+        if taken_message is None:
             break
-        taken.append(found[0])
+        taken.append(taken_message[0])
     return taken
 
 

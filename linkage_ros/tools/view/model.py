@@ -103,13 +103,13 @@ def build_model(
     try:
         inputs = usual_inputs(closure)
         drawn = drawn_in_frames(prepare_view(closure, inputs))
-        found = _model_json(closure, name, text, content.units, inputs, drawn)
+        model = _model_json(closure, name, text, content.units, inputs, drawn)
         if whole:
-            found['others'] = _other_assemblies(closure, content)
-            found |= _analyse_linkage(closure, content)
+            model['others'] = _other_assemblies(closure, content)
+            model |= _analyse_linkage(closure, content)
     except DefinitionError as error:
         raise content.locate_error(error) from None
-    return found
+    return model
 
 
 def model_of(
@@ -119,12 +119,12 @@ def model_of(
     inputs, content = usual_inputs(closure), content or Section('', '', {'units': 'm'})
     name, analysed = name or closure.name, _analyse_linkage(closure, content)
     if isinstance(closure, SpaceClosure):
-        found = _space_json(closure, name, text, content.units, inputs)
+        model = _space_json(closure, name, text, content.units, inputs)
     else:
         planar: Any = closure
         drawn = drawn_in_frames(prepare_view(planar, inputs))
-        found = _model_json(planar, name, text, content.units, inputs, drawn)
-    return found | {'others': [], **analysed}
+        model = _model_json(planar, name, text, content.units, inputs, drawn)
+    return model | {'others': [], **analysed}
 
 
 def _space_json(
@@ -213,13 +213,13 @@ def _motion_json(
         'text': text,
         'inputs': [
             {
-                'name': given.joint,
-                'unit': given.unit,
-                'low': finite_or_none(given.limits.low),
-                'high': finite_or_none(given.limits.high),
+                'name': driven.joint,
+                'unit': driven.unit,
+                'low': finite_or_none(driven.limits.low),
+                'high': finite_or_none(driven.limits.high),
                 'value': value,
             }
-            for given, value in zip(closure.linkage.inputs, inputs, strict=True)
+            for driven, value in zip(closure.linkage.inputs, inputs, strict=True)
         ],
         'joints': [
             {'name': joint, 'unit': 'rad' if turning else 'm'}
@@ -256,26 +256,30 @@ def _point_distances(closure: PlanarClosure) -> Iterator[dict[str, Any]]:
     for link, points in closure.linkage.links.items():
         pairs = list(combinations(points, 2))
         if len(points) > _MOST_PAIRS:
-            pairs = [(one, other) for one, other in pairs if one == next(iter(points))]
-        for one, other in pairs:
+            pairs = [(start, end) for start, end in pairs if start == next(iter(points))]
+        for start, end in pairs:
             yield {
-                'key': f'{link} {one}–{other}',
+                'key': f'{link} {start}–{end}',
                 'link': link,
-                'from': one,
-                'to': other,
-                'value': dist(points[one], points[other]),
+                'from': start,
+                'to': end,
+                'value': dist(points[start], points[end]),
             }
 
 
 def _other_assemblies(closure: PlanarClosure, content: Section) -> list[dict[str, Any]]:
     """Return the other assemblies in which the linkage closes."""
     try:
-        found = find_closures(content, closure.name)
+        closures = find_closures(content, closure.name)
     except FileError:  # it has none, or too many to choose from
         return []
     own = written_sides(closure)
-    others = [(text, other) for text, other in found.items() if other.linkage.assembly != own]
-    return [{'text': text, 'program': program_of(other)} for text, other in others[:_MOST_GHOSTS]]
+    others = [
+        (text, assembly) for text, assembly in closures.items() if assembly.linkage.assembly != own
+    ]
+    return [
+        {'text': text, 'program': program_of(assembly)} for text, assembly in others[:_MOST_GHOSTS]
+    ]
 
 
 def _analyse_linkage(closure: Closure, content: Section) -> dict[str, Any]:
@@ -288,15 +292,15 @@ def _analyse_linkage(closure: Closure, content: Section) -> dict[str, Any]:
         step = (interval.highest - interval.lowest) / (count - 1)
         values += [interval.lowest + step * i for i in range(count - 1)] + [interval.highest]
     margins = [_quality_at(closure, sweep, value) for value in values]
-    angles, conditioning = ([finite_or_none(each[i]) for each in margins] for i in (0, 1))
+    angles, conditioning = ([finite_or_none(margin[i]) for margin in margins] for i in (0, 1))
     return {
         'ranges': [[interval.lowest, interval.highest] for interval in sweep.ranges],
         'toggles': [
-            each.value for each in closure.singular_inputs if each.status is Status.TOGGLE
+            place.value for place in closure.singular_inputs if place.status is Status.TOGGLE
         ],
         'quality': {'input': values, 'transmission_angle': angles, 'margin': conditioning},
         'warnings': list(
-            _linkage_warnings(closure, content, [each for each in angles if each is not None])
+            _linkage_warnings(closure, content, [angle for angle in angles if angle is not None])
         ),
     }
 
@@ -317,16 +321,16 @@ def _linkage_warnings(closure: Closure, content: Section, angles: list[float]) -
         yield str(note)
     if angles and min(angles) < _POOR:
         yield f'transmission angle down to {round(degrees(min(angles)), 2):g}°'
-    passed = [each for each in closure.singular_inputs if each.status is not Status.TOGGLE]
+    passed = [place for place in closure.singular_inputs if place.status is not Status.TOGGLE]
     if passed:
-        kinds = ' and '.join(dict.fromkeys(each.status.value for each in passed))
+        kinds = ' and '.join(dict.fromkeys(place.status.value for place in passed))
         yield f'{kinds} at {len(passed)} input{"s" if len(passed) > 1 else ""}'
 
 
 def compute_pose(closure: Any, inputs: Sequence[float]) -> dict[str, Any]:
     """Return a pose as the program would, if a linkage has none; rates at a first input of 1."""
     position = closure.position(*inputs)
-    found: dict[str, Any] = {
+    pose: dict[str, Any] = {
         'status': _STATUSES[position.status.name],
         'joints': list(position.joints),
         'rates': [],
@@ -335,12 +339,12 @@ def compute_pose(closure: Any, inputs: Sequence[float]) -> dict[str, Any]:
         'frameRates': [],
     }
     if not position.joints:
-        return found
+        return pose
     in_space = isinstance(closure, SpaceClosure)
     if in_space:
-        found['frames'] = SpaceDrawing(closure).places(position).ravel().tolist()
+        pose['frames'] = SpaceDrawing(closure).places(position).ravel().tolist()
     else:
-        found['frames'] = _flatten_frames(closure.link_frames.frames_at(position))
+        pose['frames'] = _flatten_frames(closure.link_frames.frames_at(position))
     if position.status.has_rates:
         rest = [0.0] * (len(inputs) - 1)
         velocity = closure.velocity(position, 1.0, *rest)
@@ -352,10 +356,10 @@ def compute_pose(closure: Any, inputs: Sequence[float]) -> dict[str, Any]:
             if in_space
             else _flatten_frames(closure.link_frames.frame_rates(position, velocity)),
         }
-        # Beside a toggle they may be larger than a number can be.
+        # Next to a toggle they may be larger than a number can be.
         if all(map(isfinite, chain(*motion.values()))):
-            found |= motion
-    return found
+            pose |= motion
+    return pose
 
 
 def _flatten_frames(frames: Sequence[tuple[complex, float]]) -> list[float]:

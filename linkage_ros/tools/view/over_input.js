@@ -7,7 +7,7 @@ const OverInput = (() => {
   const ASIDE = 0.05; // of the values at each end do not count for how high a curve is drawn
   const EDGE = 0.08; // of the span
   const SECOND_AXIS = 58; // pixels
-  const WILD = 6; // times the span of the others: values as far as these are beside a toggle
+  const WILD = 6; // times the span of the others: values as far as these are next to a toggle
   const [POOR, FAIR] = [Math.PI / 6, Math.PI / 4];
   const ORDER = { joints: 0, rates: 1, accelerations: 2 };
   const QUALITY = { poor: '#d55e00', fair: '#e6b422', good: '#009e73' };
@@ -43,7 +43,7 @@ const OverInput = (() => {
   /**
    * Return the range of an axis for the curves on it; undefined leaves it to Plotly.
    *
-   * Beside a toggle rates and accelerations have no bound: there the axis ends before they do.
+   * Next to a toggle rates and accelerations have no bound: there the axis ends before they do.
    */
   function within(traces) {
     const sorted = traces.flatMap(({ y }) => y).filter((each) => each !== null).sort((a, b) => a - b);

@@ -70,7 +70,7 @@ def page_html(
     """
     Return the page of a linkage; see `linkage_ros.tools.view.model`.
 
-    The mode is ``edit`` beside a server, ``still`` without one, ``live`` beside a node.
+    The mode is ``edit`` with a server, ``still`` without one, ``live`` with a node.
     ``can_save`` is whether the server may save the user's file. ``scene`` is the name of the scene
     whose sensors are read. A LinkageError is raised if plotly is not installed.
     """
@@ -126,7 +126,7 @@ def _header(title: str, served: bool, editing: bool, can_save: bool) -> Iterator
         yield '<option value="">Download …</option>'
         for kind, what in _DOWNLOADS.items():
             if kind == 'dxf' and not editing:
-                continue  # links in space are no flat parts
+                continue  # links in space are not flat parts
             yield f'<option value="{kind}">{what}</option>'
         yield '</select>'
     yield '</header>'

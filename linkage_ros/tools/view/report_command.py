@@ -92,8 +92,8 @@ def bag_page(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool
     """
     bag = open_bag(bag_path, stop)
     layouts = [layout_of(path) for path in bag.files]
-    found, scene, missing = read_part(bag, layouts, window, stop, trust_effects=trust_effects)
-    account = bag_json(bag, layouts, found.contents)
+    run, scene, missing = read_part(bag, layouts, window, stop, trust_effects=trust_effects)
+    account = bag_json(bag, layouts, run.contents)
     account |= {'scene': None, 'scene_missing': None, 'replay': None}
     # A page is passed on to others: it shows the bag's name, not its path.
     if account['damage']:
@@ -103,11 +103,11 @@ def bag_page(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool
         account['scene'] = scene_json(scene)
     name = scene.name if scene is not None else bag_path.resolve().name
     page = run_html(
-        found,
+        run,
         ReportHeader(
             title=f'Run of {name}',
-            facts=list(_run_facts(account, found, scene)),
-            warnings=list(_find_warnings(bag, account, found, scene, missing)),
+            facts=list(_run_facts(account, run, scene)),
+            warnings=list(_find_warnings(bag, account, run, scene, missing)),
             tables=_page_tables(account),
             wrapped=scene is not None and scene.wrapped,
             units=scene.units if scene is not None else Units(),
@@ -128,15 +128,15 @@ def _page_tables(account: dict[str, Any]) -> list[Table]:
 
 
 def _run_facts(
-    account: dict[str, Any], found: ReportedRun, scene: Scene | None
+    account: dict[str, Any], run: ReportedRun, scene: Scene | None
 ) -> Iterator[tuple[str, str]]:
     yield 'bag', Path(account['bag']).resolve().name
     if account['begin']:
         yield 'begun', account['begin']
         yield 'duration', f'{account["duration_ns"] / 1e9:.6f} s'
-    since, until = found.window
-    if since > 0 or until < found.end:
-        yield 'part', f'{seconds_text(since)} s to {seconds_text(min(until, found.end))} s'
+    since, until = run.window
+    if since > 0 or until < run.end:
+        yield 'part', f'{seconds_text(since)} s to {seconds_text(min(until, run.end))} s'
     yield 'messages', f'{account["messages"]:,}'
     if scene is not None:
         yield 'ticks', f'{scene.rate:g} a second' if scene.rate else 'one a sample'
@@ -146,7 +146,7 @@ def _run_facts(
 
 
 def _find_warnings(
-    bag: Bag, account: dict[str, Any], found: ReportedRun, scene: Scene | None, missing: str
+    bag: Bag, account: dict[str, Any], run: ReportedRun, scene: Scene | None, missing: str
 ) -> Iterator[str]:
     """Yield the missing or damaged parts of a run."""
     if missing and scene is None:
@@ -165,8 +165,8 @@ def _find_warnings(
         yield f'Not from the beginning: {account["beginning_missing"]}.'
     for gap in describe_gaps(bag):
         yield f'{gap[:1].upper()}{gap[1:]}.'
-    if account['messages'] and found.window.since > found.end:
-        yield f'The part begins after the end of the run, at {seconds_text(found.end)} s.'
+    if account['messages'] and run.window.since > run.end:
+        yield f'The part begins after the end of the run, at {seconds_text(run.end)} s.'
 
 
 def check_page(file: Path) -> None:
@@ -224,7 +224,7 @@ def read_part(
     """
     size = max(1, sum(layout.content for layout in layouts) // _MIB)
     with show_progress('read [MiB]') as advance:
-        found = read_run(
+        run = read_run(
             bag,
             window,
             Progress(lambda read: advance(read // _MIB, max(size, read // _MIB)), stop.is_set),
@@ -232,4 +232,4 @@ def read_part(
         )
     if stop.is_set():
         raise StoppedError
-    return found
+    return run

@@ -128,9 +128,9 @@ class RequestHandler:
         except LinkageError as error:
             return failure_answer(request.number, error, request.content)
         except Exception as error:  # noqa: BLE001 (a request must not end its server)
-            found = defect_error(request.do, error)
-            self._report(str(found))
-            return failure_answer(request.number, found)
+            defect = defect_error(request.do, error)
+            self._report(str(defect))
+            return failure_answer(request.number, defect)
 
     def _sensors_of(self, page: int, text: str | None) -> Sensors:
         """Return the sensors of a page; new ones if it has changed the linkage."""
@@ -207,10 +207,10 @@ def _answer_edit(fields: _RequestFields) -> dict[str, Any]:
         raise _invalid_value('edit', edit, 'an object')
     text, inputs = edit_text(fields.text, edit, fields.name)
     shown = ViewState(tuple(inputs), fields.size) if fields.size else None
-    found = build_model(text, fields.name, whole=fields.is_whole, shown=shown)
-    for given, value in zip(found['inputs'], inputs, strict=False):
-        given['value'] = value
-    return found
+    model = build_model(text, fields.name, whole=fields.is_whole, shown=shown)
+    for driven, value in zip(model['inputs'], inputs, strict=False):
+        driven['value'] = value
+    return model
 
 
 def _answer_open(fields: _RequestFields) -> dict[str, Any]:
@@ -236,12 +236,16 @@ def _answer_save(fields: _RequestFields) -> dict[str, Any]:
 
 def _answer_export(fields: _RequestFields) -> dict[str, Any]:
     closure = fields.closure
-    given = fields.content.get('inputs')
-    inputs = None if given is None else fields.read_list('inputs', len(closure.linkage.inputs))
-    found = export_linkage(
+    wanted = fields.content.get('inputs')
+    inputs = None if wanted is None else fields.read_list('inputs', len(closure.linkage.inputs))
+    exported = export_linkage(
         str(fields.content.get('kind')), closure, fields.text, fields.name, inputs
     )
-    return {'name': found.name, 'type': found.media_type, 'data': b64encode(found.data).decode()}
+    return {
+        'name': exported.name,
+        'type': exported.media_type,
+        'data': b64encode(exported.data).decode(),
+    }
 
 
 def _answer_poses(fields: _RequestFields) -> dict[str, Any]:
@@ -321,8 +325,8 @@ def _find_pin(error: LinkageError, content: Mapping[str, Any]) -> str | None:
     if named is not None or not isinstance(edit, dict):
         return named
     places = [edit, *(value for value in edit.values() if isinstance(value, dict))]
-    found = (place.get(key) for place in places for key in ('pin', 'to', 'point', 'link'))
-    return next((pin for pin in found if isinstance(pin, str)), None)
+    names = (place.get(key) for place in places for key in ('pin', 'to', 'point', 'link'))
+    return next((pin for pin in names if isinstance(pin, str)), None)
 
 
 def _compact_json(answer: Any) -> str:

@@ -128,10 +128,10 @@ class Sensors:
 def _driven_by_hand(scene_linkage: SceneLinkage) -> SceneLinkage:
     """Return a linkage whose crank is moved from outside."""
     effects, loads = scene_linkage.effects, scene_linkage.loads
-    if not any(each.computes_forces for each in effects.values()):
+    if not any(effect.computes_forces for effect in effects.values()):
         # They acted on the drive alone.
         effects = {
-            name: given for name, given in effects.items() if not isinstance(given, ForceEffect)
+            name: effect for name, effect in effects.items() if not isinstance(effect, ForceEffect)
         }
         loads = None
     drive = 'topic', TopicDrive()

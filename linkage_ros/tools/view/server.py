@@ -84,7 +84,7 @@ class Server:
     The server of a page.
 
     ``page`` returns the page; it is called in a thread whenever a browser asks. ``routes`` are
-    served beside it. ``report`` is called with one line for the first refusal of a kind, and for
+    served with it. ``report`` is called with one line for the first refusal of a kind, and for
     each defect.
     """
 
@@ -112,7 +112,7 @@ class Server:
         app = web.Application(middlewares=[self._guard])
         app.on_response_prepare.append(self._add_headers)
         app.add_subapp(f'/{self._token}', within)
-        # What is no HTTP is answered with an error; a log would only repeat it.
+        # What is not HTTP is answered with an error; a log would only repeat it.
         silent = logging.getLogger(__name__)
         silent.setLevel(logging.CRITICAL + 1)
         self._runner = web.AppRunner(
@@ -153,7 +153,7 @@ class Server:
             self._report(f'refused {what}')
 
     def report_failure(self, _loop: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
-        """Report in one line what fails beside a request; asyncio would print a traceback."""
+        """Report in one line what fails outside a request; asyncio would print a traceback."""
         error = context.get('exception')
         if isinstance(error, OSError):
             self.count_refusal(f'a connection ({error.strerror})')
@@ -216,9 +216,9 @@ class Server:
         except ConnectionError:  # the page has gone
             raise
         except Exception as error:  # noqa: BLE001 (a page must not end its server)
-            found = defect_error('linkage view', error)
-            self._report(str(found))
-            return web.Response(status=500, text=f'{found}\n')
+            defect = defect_error('linkage view', error)
+            self._report(str(defect))
+            return web.Response(status=500, text=f'{defect}\n')
         return response
 
     def _refuse(self, status: int, what: str) -> web.Response:

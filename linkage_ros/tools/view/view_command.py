@@ -10,7 +10,7 @@
 Show a linkage in the browser: drag its pins, drive it, edit it, save it.
 
 The page is served on this machine only, at an address that nobody can guess, until Ctrl-C. Of a
-scene it shows the first linkage, and what its sensors read beside the true values; of a bag it is
+scene it shows the first linkage, and what its sensors read and the true values; of a bag it is
 the report. With -o it is written to a file, where it moves without a server and is not edited.
 --node shows a node that runs.
 """
@@ -146,8 +146,8 @@ def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:
     from linkage_ros.tools.view.page import page_html
 
     if arguments.output:
-        found = build_model(shown.data.decode(), shown.name)
-        write_page(arguments.output, page_html(found, mode='still'))
+        model = build_model(shown.data.decode(), shown.name)
+        write_page(arguments.output, page_html(model, mode='still'))
         return 0
     from linkage_ros.tools.view.conversation import Conversation, UserFile
     from linkage_ros.tools.view.sensors import SceneFiles
@@ -185,10 +185,10 @@ class _Pages:
                 print(f'linkage view: {error}; the page shows it as it was', file=sys.stderr)
                 return self._page
         if data != self._data:
-            found = build_model(data.decode(), self._shown.name)
+            model = build_model(data.decode(), self._shown.name)
             scene = self._shown.scene[0] if self._shown.scene else None
             can_save = self._file is not None and self._file.is_writable
-            self._page = page_html(found, mode='edit', can_save=can_save, scene=scene)
+            self._page = page_html(model, mode='edit', can_save=can_save, scene=scene)
             self._data = data
         return self._page
 

@@ -149,12 +149,12 @@ def main() -> None:
     if opening is None:
         return
     name, scene, longest = json.loads(opening[1])
-    given = RequestHandler(name, None if scene is None else SceneFiles(*scene), report_line)
+    handler = RequestHandler(name, None if scene is None else SceneFiles(*scene), report_line)
     while (frame := _read_frame(asked)) is not None:
         # The alarm ends this process, if nobody else does.
         signal.setitimer(signal.ITIMER_REAL, longest + _SPARE)
         page, message = frame
-        answer = given.answer_request(page, read_request(message)).encode()
+        answer = handler.answer_request(page, read_request(message)).encode()
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         try:
             answers.write(_ANSWERED.pack(len(answer)) + answer)

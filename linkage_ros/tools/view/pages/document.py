@@ -57,7 +57,7 @@ def html_document(
     """
     Return a page with a title, lines of HTML, and data for its script as JSON without NaN.
 
-    ``files`` are its styles and scripts in a package, beside the ones that all pages share, in
+    ``files`` are its styles and scripts in a package, after the ones that all pages share, in
     their order. The content policy of a page ``is_served`` allows requests to its server. With
     ``has_plots`` Plotly, the scripts that draw and their colours are part of the page; a
     LinkageError is raised if Plotly is not installed.
@@ -105,8 +105,8 @@ def plotting_library() -> str:
 
 def _join_files(parts: Sequence[tuple[str, str]], kind: str) -> str:
     """Return the files of a kind, each with its package, as one text."""
-    found = (resources.files(package) / name for package, name in parts if name.endswith(kind))
-    return '\n'.join(file.read_text('utf-8') for file in found)
+    files = (resources.files(package) / name for package, name in parts if name.endswith(kind))
+    return '\n'.join(file.read_text('utf-8') for file in files)
 
 
 def _script_json(data: Any) -> str:

@@ -101,8 +101,8 @@ class RunClock:
 
     def pop_jumps(self) -> Iterator[tuple[int, int]]:
         """Yield time and size of the clock's jumps since the last call, in [ns]."""
-        found, self._jumps = self._jumps, []
-        yield from found
+        jumps, self._jumps = self._jumps, []
+        yield from jumps
 
 
 class Progress(NamedTuple):
@@ -131,29 +131,29 @@ class Blocks:
     def __iter__(self) -> Iterator[Mapping[str, list[Entry]]]:
         """Yield the messages of each wanted topic, block by block."""
         wanted = self._wanted
-        found: dict[str, list[Entry]] = {}
+        wanted_entries: dict[str, list[Entry]] = {}
         others: dict[str, list[tuple[int, int]]] = {}
         count = size = last = 0
         for topic, logged, published, data in self._whole_blocks(self._bag.messages()):
             filled = max(count / _MOST_MESSAGES, size / _MOST_BYTES)
             if filled >= (1 if logged != last else _FARTHEST):
-                yield self._count_block(found, others)
-                found, others, count, size = {}, {}, 0, 0
+                yield self._count_block(wanted_entries, others)
+                wanted_entries, others, count, size = {}, {}, 0, 0
                 if self._progress.stopped():
                     self._stopped = True
                     return
             last = logged
             if topic in wanted:
-                if topic in found:
-                    found[topic].append((count, logged, published, data))
+                if topic in wanted_entries:
+                    wanted_entries[topic].append((count, logged, published, data))
                 else:
-                    found[topic] = [(count, logged, published, data)]
+                    wanted_entries[topic] = [(count, logged, published, data)]
                 size += len(data)
             else:
                 others.setdefault(topic, []).append((logged, len(data)))
             count += 1
-        if found or others:
-            yield self._count_block(found, others)
+        if wanted_entries or others:
+            yield self._count_block(wanted_entries, others)
 
     def count_contents(self) -> Contents:
         """Return the counts of what has been read."""
@@ -167,16 +167,16 @@ class Blocks:
 
     def _count_block(
         self,
-        found: Mapping[str, list[Entry]],
+        entries_by_topic: Mapping[str, list[Entry]],
         others: Mapping[str, list[tuple[int, int]]],
     ) -> Mapping[str, list[Entry]]:
         """Count a block, report progress, and return the entries of wanted topics."""
-        for name, entries in found.items():
+        for name, entries in entries_by_topic.items():
             self._count_entries(name, [(logged, len(data)) for _, logged, _, data in entries])
         for name, sizes in others.items():
             self._count_entries(name, sizes)
         self._progress.report(self._read)
-        return found
+        return entries_by_topic
 
     def _count_entries(self, name: str, entries: list[tuple[int, int]]) -> None:
         logs, sizes = zip(*entries, strict=True)
@@ -215,8 +215,8 @@ def rows_of(
                 kinds['states' if own(entry[3]) else 'samples'].append(entry)
         elif kind is not None:
             kinds[kind] += entries
-    numbers = np.array([entry[0] for found in kinds.values() for entry in found], np.int64)
-    logged = times_of([entry[1] for found in kinds.values() for entry in found])
+    numbers = np.array([entry[0] for entries in kinds.values() for entry in entries], np.int64)
+    logged = times_of([entry[1] for entries in kinds.values() for entry in entries])
     if len(numbers):
         clock.start(int(logged[numbers.argmin()]))
     in_turn = len(numbers) - len(kinds[_OTHER_RECORDER])

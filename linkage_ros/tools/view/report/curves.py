@@ -180,13 +180,15 @@ class BoundedCurves:
 
     def build_curves(self) -> Curves | None:
         """Return the curves; None without rows."""
-        found = self._kept.build_intervals()
-        filled = [not np.isnan(column).all() for column in found.first.T]
+        intervals = self._kept.build_intervals()
+        filled = [not np.isnan(column).all() for column in intervals.first.T]
         if not any(filled):
             return None
         columns = [column for column, there in zip(self._columns, filled, strict=True) if there]
-        found = found._replace(first=found.first[:, filled], second=found.second[:, filled])
-        return Curves(self._title, columns, self._rows, found)
+        intervals = intervals._replace(
+            first=intervals.first[:, filled], second=intervals.second[:, filled]
+        )
+        return Curves(self._title, columns, self._rows, intervals)
 
 
 def joint_columns(names: Sequence[str], turning: Mapping[str, bool]) -> list[CurveColumn]:
@@ -217,15 +219,17 @@ class SceneCurves:
         self._lateness = Lateness(scene.rate) if scene.rate else None
         self.late, self.age = Histogram(), Histogram()
         moving = scene.linkages[:MOST_LINKAGES]
-        names = (name for each in moving for name in (*each.input_names, *each.joint_names))
+        names = (
+            name for linkage in moving for name in (*linkage.input_names, *linkage.joint_names)
+        )
         self._places = {name: place for place, name in enumerate(dict.fromkeys(names))}
-        # Beside the joint values, the page holds three numbers for the frame of each link, or for
+        # After the joint values, the page holds three numbers for the frame of each link, or for
         # each place of a spatial linkage, and the distance by which loops are open.
         size = 8 * (1 + len(self._places)) + 12 * bodies + 4 * len(moving)
         most = min(MOST_FRAMES, FRAME_BYTES // size)
         self._frames = Decimation(len(self._places), max(2, most - most % 2))
         # The joints of a scene are in the order of its linkages.
-        self._joints = [self._places[name] for each in moving for name in each.joint_names]
+        self._joints = [self._places[name] for linkage in moving for name in linkage.joint_names]
 
     def add_states(
         self, times: Times, numbers: Numbers, inputs: Sequence[tuple[Sequence[str], Numbers]]
@@ -263,9 +267,9 @@ class SceneCurves:
         if self._lateness is not None:
             self._add_late(*self._lateness.finish_lateness())
         kept = (self._states, self._samples, self._lates, self._ages)
-        found = [curves for each in kept if (curves := each.build_curves()) is not None]
+        lanes = [curves for recorder in kept if (curves := recorder.build_curves()) is not None]
         values = dict(zip(self._places, self._frames.values.T, strict=True))
-        return found, Frames(self._frames.step, self._frames.times, values)
+        return lanes, Frames(self._frames.step, self._frames.times, values)
 
     @property
     def left_out(self) -> dict[tuple[str, str], int]:
@@ -332,8 +336,8 @@ class LinkWrenches:
 
     def build_curves(self) -> list[Curves]:
         """Return the curves of each topic with messages."""
-        found = (kept.build_curves() for kept in self._kept.values())
-        return [each for each in found if each is not None]
+        curves = (kept.build_curves() for kept in self._kept.values())
+        return [curve for curve in curves if curve is not None]
 
 
 class PinForces:
@@ -385,17 +389,17 @@ class PinForces:
 
     def build_curves(self) -> Curves | None:
         """Return the curves, without moments that are zero, as in pins; None without messages."""
-        found = None if self._kept is None else self._kept.build_curves()
-        if found is None:
+        curves = None if self._kept is None else self._kept.build_curves()
+        if curves is None:
             return None
-        first, second = found.intervals.first, found.intervals.second
+        first, second = curves.intervals.first, curves.intervals.second
         kept = [
             place
-            for place, column in enumerate(found.columns)
+            for place, column in enumerate(curves.columns)
             if column.quantity == 'force'
             or np.nan_to_num([first[:, place], second[:, place]]).any()
         ]
-        return found._replace(
-            columns=[found.columns[place] for place in kept],
-            intervals=found.intervals._replace(first=first[:, kept], second=second[:, kept]),
+        return curves._replace(
+            columns=[curves.columns[place] for place in kept],
+            intervals=curves.intervals._replace(first=first[:, kept], second=second[:, kept]),
         )

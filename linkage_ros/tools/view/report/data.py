@@ -98,28 +98,29 @@ def link_poses(
     prefix; NaN where unknown. All have one length; the inputs are among them.
     """
     known = {
-        name: np.where(np.abs(given) < _FARTHEST, given, np.nan) for name, given in values.items()
+        name: np.where(np.abs(column) < _FARTHEST, column, np.nan)
+        for name, column in values.items()
     }
     linkage = closure.linkage
     _, (names,) = prefix_names([(prefix, linkage)])
     try:
-        found, reason = _by_joints(grow_tree(linkage, names), prefix, known), ''
+        placed, reason = _by_joints(grow_tree(linkage, names), prefix, known), ''
     except DefinitionError as error:
-        found, reason = _by_closing(closure, [known[name] for name in inputs]), error.reason
+        placed, reason = _by_closing(closure, [known[name] for name in inputs]), error.reason
     for block in separate_blocks(linkage, closure.structure):
-        place = _place_of(found, block.link, linkage.links[block.link][block.point])
-        found.setdefault(block.name, (place, found[block.along][1]))
-    links = tuple(link for link in found if link != GROUND)
+        place = _place_of(placed, block.link, linkage.links[block.link][block.point])
+        placed.setdefault(block.name, (place, placed[block.along][1]))
+    links = tuple(link for link in placed if link != GROUND)
     count = len(next(iter(values.values()), np.empty(0)))
     frames = np.full((count, len(links), 3), np.nan)
     for index, link in enumerate(links):
-        place, way = found[link]
+        place, way = placed[link]
         frames[:, index, 0] = place.real
         frames[:, index, 1] = place.imag
         frames[:, index, 2] = np.angle(way)
     # If one link of a linkage is unknown, none is drawn.
     frames[np.isnan(frames).any(axis=(1, 2))] = np.nan
-    apart = _loop_gaps(closure, found, count)
+    apart = _loop_gaps(closure, placed, count)
     apart[np.isnan(frames).any(axis=(1, 2))] = np.nan
     return Poses(links, frames, apart, reason)
 
@@ -141,11 +142,11 @@ def _by_joints(tree: Tree, prefix: str, values: Mapping[str, Numbers]) -> _Found
             frames[joint.child] = place, turned * np.exp(1j * joint.axis.real * moved)
         else:
             frames[joint.child] = place + joint.axis * moved * turned, turned
-    found = {}
+    placed = {}
     for link in tree.linkage.links:
         place, way = frames[prefix + link]
-        found[link] = place - tree.origins[link] * way, way
-    return found
+        placed[link] = place - tree.origins[link] * way, way
+    return placed
 
 
 def _by_closing(closure: PlanarClosure, inputs: Sequence[Numbers]) -> _Found:
@@ -154,25 +155,25 @@ def _by_closing(closure: PlanarClosure, inputs: Sequence[Numbers]) -> _Found:
         *(block.name for block in separate_blocks(closure.linkage, closure.structure)),
     )
     count = len(inputs[0])
-    found = {link: (np.full(count, np.nan + 0j), np.full(count, np.nan + 0j)) for link in links}
-    for i, given in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
-        if not all(np.isfinite(given)):
+    placed = {link: (np.full(count, np.nan + 0j), np.full(count, np.nan + 0j)) for link in links}
+    for i, inputs_now in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
+        if not all(np.isfinite(inputs_now)):
             continue
-        position = closure.position(*given)
+        position = closure.position(*inputs_now)
         if not position.joints:
             continue
         for link, frame in frames_of_links(closure, position).items():
-            place, way = found[link]
+            place, way = placed[link]
             place[i], way[i] = frame.place, np.exp(1j * frame.angle)
-    return found
+    return placed
 
 
-def _place_of(found: _Found, link: str, point: tuple[float, float]) -> Places:
-    place, way = found[link]
+def _place_of(placed: _Found, link: str, point: tuple[float, float]) -> Places:
+    place, way = placed[link]
     return place + complex(*point) * way
 
 
-def _loop_gaps(closure: PlanarClosure, found: _Found, count: int) -> Numbers:
+def _loop_gaps(closure: PlanarClosure, placed: _Found, count: int) -> Numbers:
     linkage = closure.linkage
     worst = np.zeros(count)
     carriers: dict[str, list[str]] = {}
@@ -180,17 +181,17 @@ def _loop_gaps(closure: PlanarClosure, found: _Found, count: int) -> Numbers:
         for point in named:
             carriers.setdefault(point, []).append(link)
     for point, (first, *others) in carriers.items():
-        place = _place_of(found, first, linkage.links[first][point])
+        place = _place_of(placed, first, linkage.links[first][point])
         for link in others:
             worst = np.maximum(
-                worst, np.abs(_place_of(found, link, linkage.links[link][point]) - place)
+                worst, np.abs(_place_of(placed, link, linkage.links[link][point]) - place)
             )
     for slider in linkage.sliders.values():
         unit = complex(*slider.direction) / abs(complex(*slider.direction))
-        through = _place_of(found, slider.along, linkage.links[slider.along][slider.through])
+        through = _place_of(placed, slider.along, linkage.links[slider.along][slider.through])
         carrier = carriers[slider.point][0]
-        between = _place_of(found, carrier, linkage.links[carrier][slider.point]) - through
-        across = between / (unit * found[slider.along][1])
+        between = _place_of(placed, carrier, linkage.links[carrier][slider.point]) - through
+        across = between / (unit * placed[slider.along][1])
         worst = np.maximum(worst, np.abs(across.imag))
     return worst
 
@@ -217,9 +218,9 @@ def page_data(run: ReportedRun, wrapped: bool, units: Units) -> dict[str, Any]:
             for key, lane in event_tracks(run).items()
         ],
         'histograms': {
-            key: _histogram_json(found)
-            for key, found in (('lateness', run.lateness), ('age', run.age))
-            if found is not None
+            key: _histogram_json(histogram)
+            for key, histogram in (('lateness', run.lateness), ('age', run.age))
+            if histogram is not None
         },
     }
 
@@ -227,14 +228,14 @@ def page_data(run: ReportedRun, wrapped: bool, units: Units) -> dict[str, Any]:
 def event_tracks(run: ReportedRun) -> dict[str, EventTrack]:
     """Return the lanes that have events, in the order of the page."""
     shown = dict(run.event_tracks)
-    silent = [each.silent for each in run.linkages]
+    silent = [linkage.silent for linkage in run.linkages]
     if silent:
         # Each linkage has its own silences; one lane shows all.
         merged = EventTrack(APART)
         spans = [
-            (s.begin, s.end, each.name, s.count)
-            for each in run.linkages
-            for s in each.silent.spans
+            (s.begin, s.end, linkage.name, s.count)
+            for linkage in run.linkages
+            for s in linkage.silent.spans
         ]
         for span in sorted(spans):
             merged.add(*span)
@@ -254,7 +255,7 @@ def zero_plots(run: ReportedRun) -> list[str]:
 
 
 def _all_plots(run: ReportedRun) -> list[Plot]:
-    found: dict[str, Plot] = {}
+    plots: dict[str, Plot] = {}
     # The crank comes first: everything else depends on it.
     driven = {name for linkage in run.linkages for name in linkage.inputs}
     order = sorted(
@@ -263,14 +264,14 @@ def _all_plots(run: ReportedRun) -> list[Plot]:
             for index, curves in enumerate(run.curves)
             for place, column in enumerate(curves.columns)
         ),
-        key=lambda each: (each[2].name not in driven, each[0]),
+        key=lambda curve: (curve[2].name not in driven, curve[0]),
     )
     published = {
         (column.name, column.quantity) for curves in run.curves[:1] for column in curves.columns
     }
     for number, place, column in order:
         key, title = QUANTITIES[column.quantity, column.unit]
-        plot = found.setdefault(
+        plot = plots.setdefault(
             key, {'key': key, 'title': title, 'unit': column.unit, 'curves': []}
         )
         # If a joint is on two topics, the topic is shown as well.
@@ -278,7 +279,7 @@ def _all_plots(run: ReportedRun) -> list[Plot]:
         foreign = not run.linkages and len(run.curves) > 1
         topic = f' on {run.curves[number].title}' if twice or foreign else ''
         plot['curves'].append({'of': number, 'column': place, 'name': column.name + topic})
-    return [found[key] for key, _ in QUANTITIES.values() if key in found]
+    return [plots[key] for key, _ in QUANTITIES.values() if key in plots]
 
 
 def _is_zero(plot: Plot, run: ReportedRun) -> bool:
@@ -319,7 +320,7 @@ def _frames_json(frames: Frames) -> dict[str, Any]:
 
 
 def _linkages_json(linkages: Sequence[LinkageRun], frames: Frames) -> list[dict[str, Any]]:
-    found, space = [], SHAPE_BYTES
+    shown, space = [], SHAPE_BYTES
     for linkage in linkages:
         closure: Any = linkage.closure
         drawing: dict[str, Any] | None = None
@@ -329,8 +330,8 @@ def _linkages_json(linkages: Sequence[LinkageRun], frames: Frames) -> list[dict[
             poses, drawing = _spatial_poses(closure, [frames.values[n] for n in linkage.inputs])
         drawn, size, undrawn = _drawing_of(closure, drawing, space)
         space -= size
-        found.append({**_linkage_json(linkage, poses), 'drawn': drawn, 'undrawn': undrawn})
-    return found
+        shown.append({**_linkage_json(linkage, poses), 'drawn': drawn, 'undrawn': undrawn})
+    return shown
 
 
 def _drawing_of(
@@ -350,29 +351,29 @@ def _drawing_of(
 def _spatial_poses(closure: SpaceClosure, inputs: Sequence[Numbers]) -> tuple[Poses, Any]:
     """Return places of a spatial linkage instead of frames, and its drawing."""
     drawing, count = SpaceDrawing(closure), len(inputs[0])
-    found = np.full((count, drawing.count, 3), np.nan)
-    for i, given in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
-        if all(abs(value) < _FARTHEST for value in given):
-            position = closure.position(*given)
+    places = np.full((count, drawing.count, 3), np.nan)
+    for i, inputs_now in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
+        if all(abs(value) < _FARTHEST for value in inputs_now):
+            position = closure.position(*inputs_now)
             if position.joints:
-                found[i] = drawing.places(position)
-    known = found[np.isfinite(found).all(axis=(1, 2))]
+                places[i] = drawing.places(position)
+    known = places[np.isfinite(places).all(axis=(1, 2))]
     if not len(known):
         known = drawing.places(closure.position(*usual_inputs(closure)))[None]
-    return Poses((), found, np.full(count, np.nan), ''), space_page_data(drawing, known)
+    return Poses((), places, np.full(count, np.nan), ''), space_page_data(drawing, known)
 
 
-def _linkage_json(linkage: LinkageRun, found: Poses) -> dict[str, Any]:
+def _linkage_json(linkage: LinkageRun, poses: Poses) -> dict[str, Any]:
     return {
         'name': linkage.name,
         'inputs': linkage.inputs,
         'input_units': linkage.input_units,
         'joints': linkage.joints,
         'units': ['rad' if turning else 'm' for turning in linkage.closure.turning],
-        'links': found.links,
-        'poses': _pack_values(found.frames, '<f4'),
-        'apart': _pack_values(found.apart, '<f4'),
-        'untold': shorten_text(found.reason, 200),
+        'links': poses.links,
+        'poses': _pack_values(poses.frames, '<f4'),
+        'apart': _pack_values(poses.apart, '<f4'),
+        'untold': shorten_text(poses.reason, 200),
         'silent': [[span.begin / 1e9, span.end / 1e9] for span in linkage.silent.in_order],
     }
 

@@ -183,7 +183,7 @@ def _least_and_greatest(values: Numbers) -> tuple[Numbers, Numbers]:
     none = np.isnan(values)
     low = np.where(none, np.inf, values).argmin(axis=1)[:, None]
     high = np.where(none, -np.inf, values).argmax(axis=1)[:, None]
-    # With only NaN and infinities, an index found may point at a NaN beside a number.
+    # With only NaN and infinities, an index found may point at a NaN next to a number.
     least = np.fmin.reduce(values, axis=1)
     greatest = np.fmax.reduce(values, axis=1)
     rising = (low <= high)[:, 0]

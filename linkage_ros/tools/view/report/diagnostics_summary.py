@@ -63,7 +63,7 @@ class DiagnosticStatus(NamedTuple):
 def read_statuses(data: bytes) -> list[DiagnosticStatus]:
     """Return the statuses of a message; none if it is damaged."""
     try:
-        found = parse_message(data, DIAGNOSTIC_ARRAY, _MOST_ITEMS)['status']
+        statuses = parse_message(data, DIAGNOSTIC_ARRAY, _MOST_ITEMS)['status']
     except MalformedError:
         return []
     return [
@@ -76,7 +76,7 @@ def read_statuses(data: bytes) -> list[DiagnosticStatus]:
                 for value in status['values']
             },
         )
-        for status in found
+        for status in statuses
     ]
 
 

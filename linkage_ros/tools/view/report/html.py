@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-The report of a run as an HTML page with tables; the scripts beside this file draw its plots.
+The report of a run as an HTML page with tables; the scripts next to this file draw its plots.
 
 The page has a size limit, whatever the bag holds.
 """
@@ -70,7 +70,7 @@ _ANGLE_CONTROLS = (
 def tables_html(tables: Sequence[Table]) -> Iterator[str]:
     """Yield tables as HTML within the size limit; say how much is left out."""
     space = TABLE_BYTES
-    for index, table in enumerate(each.as_texts() for each in tables):
+    for index, table in enumerate(table_shown.as_texts() for table_shown in tables):
         if not table.rows:
             continue
         space -= _BESIDE_TABLE + _row_size([shorten_text(table.title), *table.heads])
@@ -91,7 +91,7 @@ def tables_html(tables: Sequence[Table]) -> Iterator[str]:
 
 def _row_size(cells: Sequence[str]) -> int:
     written = (escape(cell).encode('utf-8', 'backslashreplace') for cell in cells)
-    return _BESIDE_ROW + sum(_BESIDE_CELL + len(each) for each in written)
+    return _BESIDE_ROW + sum(_BESIDE_CELL + len(cell) for cell in written)
 
 
 def _run_table_html(table: Table) -> Iterator[str]:
@@ -142,17 +142,17 @@ def run_tables(run: ReportedRun, units: Units) -> Iterator[Table]:
 
 
 def _curve_ranges(curves: Curves, units: Units) -> Iterator[tuple[str, ...]]:
-    found = curves.intervals
+    intervals = curves.intervals
     for index, (name, quantity, unit) in enumerate(curves.columns):
-        least = np.nanmin(np.fmin(found.first[:, index], found.second[:, index]))
-        greatest = np.nanmax(np.fmax(found.first[:, index], found.second[:, index]))
+        least = np.nanmin(np.fmin(intervals.first[:, index], intervals.second[:, index]))
+        greatest = np.nanmax(np.fmax(intervals.first[:, index], intervals.second[:, index]))
         ends = [f'{units.to_file_unit(float(end), unit):.9g}' for end in (least, greatest)]
         yield name, quantity, *ends, units.file_unit(unit), curves.title
 
 
 class ReportHeader(NamedTuple):
     """
-    The facts of a bag that a page shows beside its run: at its head, as warnings, and as tables.
+    The facts of a bag that a page shows with its run: at its head, as warnings, and as tables.
 
     If ``wrapped``, published angles jump from π to −π.
     """
@@ -238,8 +238,8 @@ def _player_html(linkages: Sequence[LinkageRun], data: dict[str, object]) -> Ite
     yield '</select></label>'
     yield '<label><input type="checkbox" id="traces" checked> traced curves</label>'
     yield '</div><dl class="readout" id="readout" aria-live="off"></dl>'
-    why = next((each['untold'] for each in drawn if each['untold']), '')
-    kinds = {'camera' in each['drawn'] for each in drawn if each['drawn']}
+    why = next((linkage['untold'] for linkage in drawn if linkage['untold']), '')
+    kinds = {'camera' in linkage['drawn'] for linkage in drawn if linkage['drawn']}
     if False in kinds:
         yield f'<p class="note">{escape(CLOSED_NOTE.format(why=why) if why else POSE_NOTE)}</p>'
     if True in kinds:
@@ -264,7 +264,7 @@ def _events_html(run: ReportedRun) -> Iterator[str]:
 
 
 def _plots_html(run: ReportedRun, units: Units) -> Iterator[str]:
-    found = time_plots(run)
+    plots = time_plots(run)
     if not run.curves:
         yield '<section><h2>Over time</h2><p>No joint states are in this bag.</p></section>'
         return
@@ -279,7 +279,7 @@ def _plots_html(run: ReportedRun, units: Units) -> Iterator[str]:
         f'The page is no larger than {PAGE_BYTES // 1_000_000} MB, however long the run.</p>'
     )
     keys = '<kbd>+</kbd> <kbd>-</kbd> <kbd>0</kbd> zoom, <kbd>L</kbd> light or dark'
-    if any(plot['unit'] == 'rad' for plot in found):
+    if any(plot['unit'] == 'rad' for plot in plots):
         keys = f'<kbd>D</kbd> degrees, <kbd>W</kbd> within a turn, {keys}'
         yield _ANGLE_CONTROLS
     if moving:
@@ -295,11 +295,13 @@ def _plots_html(run: ReportedRun, units: Units) -> Iterator[str]:
         'pin_forces': FORCE_NOTE,
         'loads': FORCE_NOTE,
     }
-    for plot in found:
+    for plot in plots:
         title = f'{plot["title"]} [{units.file_unit(plot["unit"])}]'
         yield _plot_html(plot['key'], title, notes.get(plot['key'], ''))
     yield '</section>'
-    crossed = [each for each in run.linkages if run.frames is not None and len(run.frames.times)]
+    crossed = [
+        linkage for linkage in run.linkages if run.frames is not None and len(run.frames.times)
+    ]
     if crossed:
         yield '<section><h2>Over the crank</h2>'
         yield '<p class="note">The instants of the moving picture that are within the zoom.</p>'
@@ -314,18 +316,20 @@ def _histograms_html(run: ReportedRun) -> Iterator[str]:
         ('lateness', 'How late ticks were, all', run.lateness),
         ('age', 'How old the input was, all', run.age),
     )
-    if not any(found for _, _, found in spread):
+    if not any(histogram for _, _, histogram in spread):
         return
     yield '<section><h2>How durations are spread</h2>'
-    for key, title, found in spread:
-        if found is not None:
-            yield _plot_html(f'spread_{key}', title, _spread_note(found))
+    for key, title, histogram in spread:
+        if histogram is not None:
+            yield _plot_html(f'spread_{key}', title, _spread_note(histogram))
     yield '</section>'
 
 
-def _spread_note(found: Histogram) -> str:
-    parts = [f'p{p} ≤ {duration_text(found.percentile(p) / 1e9)}' for p in (50, 90, 99)]
-    return f'{found.count:,} ticks: {", ".join(parts)}, max {duration_text(found.greatest / 1e9)}.'
+def _spread_note(counts: Histogram) -> str:
+    parts = [f'p{p} ≤ {duration_text(counts.percentile(p) / 1e9)}' for p in (50, 90, 99)]
+    return (
+        f'{counts.count:,} ticks: {", ".join(parts)}, max {duration_text(counts.greatest / 1e9)}.'
+    )
 
 
 def _plot_html(key: str, title: str, note: str = '') -> str:

@@ -80,20 +80,20 @@ class JointStates:
             for _ in range(_MOST_LAYOUTS):
                 if not len(left):
                     break
-                taken, columns, found, stamp = self._read_alike(table, messages[left[0]])
+                taken, columns, values_read, stamp = self._read_alike(table, messages[left[0]])
                 which = left[taken]
-                if found:
+                if values_read:
                     good[which] = True
                     stamps[which] = stamp
-                    parts.append((which, columns, found))
+                    parts.append((which, columns, values_read))
                 left, table = left[~taken], table[~taken]
             self.left_out[TOO_MANY_LAYOUTS] += len(left)
         numbers = np.full((n, 3, len(self.joints)), np.nan)
-        for which, columns, found in parts:
+        for which, columns, values_read in parts:
             kept = [i for i, column in enumerate(columns) if column >= 0]
             if self._others:
                 self.left_out[TOO_MANY_JOINTS] += (len(columns) - len(kept)) * len(which)
-            for quantity, values in found:
+            for quantity, values in values_read:
                 under = [columns[i] for i in kept]
                 numbers[which[:, None], quantity, under] = values[:, kept]
         return JointBlock(good, stamps, numbers)
@@ -104,12 +104,12 @@ class JointStates:
         """Return the rows with the layout of the first, their joints' columns and numbers."""
         none = np.zeros(len(table), bool)
         none[0] = True
-        found = arrays_of(first)
-        reason = found.value if isinstance(found, Rejection) else _mismatch_reason(found)
-        if isinstance(found, Rejection) or reason:
+        layout = arrays_of(first)
+        reason = layout.value if isinstance(layout, Rejection) else _mismatch_reason(layout)
+        if isinstance(layout, Rejection) or reason:
             self.left_out[reason] += 1
             return none, [], [], np.empty(0, np.int64)
-        order, names, arrays = found
+        order, names, arrays = layout
         fixed = np.ones(table.shape[1], bool)
         fixed[4:12] = False
         for count_at, n, begin in arrays:
@@ -144,9 +144,9 @@ class JointStates:
         return len(self.joints) - 1
 
 
-def _mismatch_reason(found: tuple[str, list[bytes], Sequence[tuple[int, int, int]]]) -> str:
+def _mismatch_reason(layout: tuple[str, list[bytes], Sequence[tuple[int, int, int]]]) -> str:
     """Return why a message whose arrays do not fit its names is left out; '' if they fit."""
-    _, names, arrays = found
+    _, names, arrays = layout
     counts = {n for _, n, _ in arrays} - {0}
     # A command may have only efforts.
     if not names or not counts:

@@ -93,11 +93,11 @@ class ForeignRun:
     """Reads the window of a bag without a scene, block by block."""
 
     def __init__(self, bag: Bag, window: Window) -> None:
-        found = [topic.name for topic in bag.topics if topic.type == JOINT_STATE_TYPE]
+        names = [topic.name for topic in bag.topics if topic.type == JOINT_STATE_TYPE]
         self._window, self._clock = window, RunClock(_DISORDER)
-        self.topics = set(found[:_MOST_TOPICS])
-        self._more = found[_MOST_TOPICS:]
-        self._readers = {topic: JointStates() for topic in found[:_MOST_TOPICS]}
+        self.topics = set(names[:_MOST_TOPICS])
+        self._more = names[_MOST_TOPICS:]
+        self._readers = {topic: JointStates() for topic in names[:_MOST_TOPICS]}
         self._kept: dict[str, BoundedCurves] = {}
         self._widths: dict[str, int] = {}
         self._event_tracks = {'jump': EventTrack(window=window)}
@@ -145,7 +145,7 @@ class ForeignRun:
         """Return the run, with the counts of all messages."""
         if len(self._readers) == 1:
             self._silences.end_run(self._clock.end)
-        found = [
+        lanes = [
             curves for kept in self._kept.values() if (curves := kept.build_curves()) is not None
         ]
         left_out = {
@@ -167,7 +167,7 @@ class ForeignRun:
             end=self._clock.end,
             window=self._window,
             contents=contents,
-            curves=found,
+            curves=lanes,
             event_tracks=self._event_tracks,
             left_out=left_out,
         )
@@ -210,11 +210,11 @@ def _find_open_loop_spans(
         return
     status = linkage.closure.solve(*angles.T, derivatives=0).status
     is_open = status >= CODES[Status.OPEN]
-    for time, given in zip(times[is_open].tolist(), angles[is_open].tolist(), strict=True):
+    for time, inputs in zip(times[is_open].tolist(), angles[is_open].tolist(), strict=True):
         text = ''
         # The first of the joined events gives the text.
         if not track.spans or time - track.spans[-1].end > track.near:
-            position = linkage.closure.position(*given)
+            position = linkage.closure.position(*inputs)
             text = f'{position.status.value}, the links miss by {position.gap:.3g} m'
         track.add(time, time, f'{linkage.name} {text}'.strip())
 
@@ -240,7 +240,7 @@ class SceneRun:
             run.resets_topic: 'resets',
             run.joint_states_topic: 'states',
         }
-        wrenches = [each.name for each in bag.topics if each.type == WRENCHES]
+        wrenches = [topic.name for topic in bag.topics if topic.type == WRENCHES]
         forces = [name for name in wrenches if name in run.extras]
         self._forces = PinForces(', '.join(forces), window)
         for name in forces:
@@ -259,7 +259,7 @@ class SceneRun:
                 linkage.closure,
                 scene_linkage.input_names,
                 scene_linkage.joint_names,
-                tuple(given.unit for given in scene_linkage.linkage.inputs),
+                tuple(driven.unit for driven in scene_linkage.linkage.inputs),
                 EventTrack(APART, longest=True, most=_MOST_SILENCES, window=window),
             )
             for scene_linkage, linkage in zip(scene.linkages, pipeline.linkages, strict=True)
@@ -282,11 +282,11 @@ class SceneRun:
         self._has_limits = any(scene_linkage.linkage.limits for scene_linkage in scene.linkages)
         self._tells_toggles = len(scene.linkages) == 1 and 'velocity' in scene.linkages[0].effects
         self._health = RecordedDiagnostics(self._event_tracks, from_beginning)
-        bodies = sum(_count_bodies(each.closure) for each in self._linkages[:MOST_LINKAGES])
+        bodies = sum(_count_bodies(linkage.closure) for linkage in self._linkages[:MOST_LINKAGES])
         topics = run.joint_states_topic, run.crank_topic
         self._curves = SceneCurves(scene, topics, bodies, window)
         period = round(1e9 / scene.rate) if scene.rate else 0
-        self._silences = [Silences(each.silent, period) for each in self._linkages]
+        self._silences = [Silences(linkage.silent, period) for linkage in self._linkages]
         self._stale = Silences(self._event_tracks['stale'], 0, pipeline.max_age)
 
     @property
@@ -410,8 +410,8 @@ class SceneRun:
         self._curves.add_states(passed, numbers, inputs)
         if stamps:
             # The oldest input of several linkages counts; 0 stands for none.
-            found = np.array(stamps)
-            oldest = np.where(found > 0, found, _NEVER).min(axis=0)
+            stamp_rows = np.array(stamps)
+            oldest = np.where(stamp_rows > 0, stamp_rows, _NEVER).min(axis=0)
             known = oldest < _NEVER
             self._curves.add_ages(passed[known], states.logged[good][known] - oldest[known])
         for number, silences in enumerate(self._silences):
