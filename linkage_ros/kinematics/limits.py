@@ -190,14 +190,10 @@ def without_mirrored(
     if zero is None:
         return ranges
     positive = tuple(
-        interval._replace(lowest=max(interval.lowest, zero))
-        for interval in ranges
-        if interval.highest > zero
+        part._replace(lowest=max(part.lowest, zero)) for part in ranges if part.highest > zero
     )
     negative = tuple(
-        interval._replace(highest=min(interval.highest, zero))
-        for interval in ranges
-        if interval.lowest < zero
+        part._replace(highest=min(part.highest, zero)) for part in ranges if part.lowest < zero
     )
     pose, limits = linkage.pose, linkage.inputs[0].limits
     if limits.high <= zero or (pose and pose.inputs[0] < zero):

@@ -117,9 +117,7 @@ class Equations:
         drift = self.drift(motion)
         # On a tape the matrix is that of rates and of accelerations, and is there only once.
         matrix = Elimination(self.evaluate(motion.solved, motion.unknowns)[1], self.unit_pivots)
-        return matrix.solve(
-            [0.0 if is_zero(drift_of_row) else -drift_of_row for drift_of_row in drift]
-        )
+        return matrix.solve([0.0 if is_zero(row) else -row for row in drift])
 
     # The closing equations by the free unknowns
 

@@ -63,8 +63,7 @@ def turning_points(closure: Closure) -> dict[str, list[float]]:
                 ends = zip((branch.first, branch.last), branch.turns_back, strict=True)
                 for place in (end for end, turns in ends if turns):
                     if all(
-                        abs(signed_distance(closure, place, known_place)) > _SAME
-                        for known_place in places
+                        abs(signed_distance(closure, place, known)) > _SAME for known in places
                     ):
                         places.append(place)
         if places:

@@ -151,10 +151,7 @@ class _DeviatingParts:
     ) -> Any:
         """Return how far two places of links are apart along a direction, with its slopes."""
         start, end = places
-        slopes = {
-            first: -self._slope(first, start, way),
-            second: self._slope(second, end, way),
-        }
+        slopes = {first: -self._slope(first, start, way), second: self._slope(second, end, way)}
         return float((end - start) @ way), slopes
 
     def _coincidences(self) -> Iterator[Any]:

@@ -236,12 +236,10 @@ def balls_of(linkage: SpaceLinkage, carried: CarriedPoints) -> Iterator[tuple[st
                 yield point, first, joined[0]
             for link in joined:
                 on_hinge = [
-                    link_on
-                    for link_on in left
-                    if _is_on_hinge(linkage, carried, point, {link, link_on})
+                    end for end in left if _is_on_hinge(linkage, carried, point, {link, end})
                 ]
                 joined += on_hinge
-                left = [link_on for link_on in left if link_on not in on_hinge]
+                left = [end for end in left if end not in on_hinge]
 
 
 def _is_on_hinge(

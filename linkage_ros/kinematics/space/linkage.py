@@ -381,10 +381,7 @@ def size_of(linkage: SpaceLinkage) -> float:
 
 def extent_of(places: Iterable[Vector]) -> float:
     """Return the greatest extent of places along an axis of the ground."""
-    return max(
-        (max(coordinates) - min(coordinates) for coordinates in zip(*places, strict=True)),
-        default=0.0,
-    )
+    return max((max(row) - min(row) for row in zip(*places, strict=True)), default=0.0)
 
 
 def unit_of(linkage: SpaceLinkage) -> float:
