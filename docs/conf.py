@@ -80,7 +80,7 @@ def setup(app: Any) -> dict[str, Any]:
 
 
 def _readable(*arguments: Any) -> tuple[str | None, str | None]:
-    """Return a signature that Sphinx can parse: the factory of a dataclass is no Python."""
+    """Return a signature that Sphinx can parse: the factory of a dataclass is not Python."""
     *_, signature, returns = arguments
     return signature and signature.replace('<factory>', '...'), returns
 

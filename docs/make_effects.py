@@ -10,7 +10,7 @@
 Make the pictures, lists and tables of docs/effects.md and the pages in docs/effects.
 
 Their text is written by hand. The text between two marks comes from the declarations in the code,
-and every picture from runs of the scene beside it. Run it in the folder of the checkout, as `make
+and every picture from runs of the scene next to it. Run it in the folder of the checkout, as `make
 effects` does: ``python -m docs.make_effects``.
 """
 

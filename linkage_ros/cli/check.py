@@ -266,12 +266,7 @@ def _map_limits(closure: Closure, _sweep: InputSweep | None) -> dict[str, Any]:
     """Return what is reached within limits of other joints."""
     joints = closure.linkage.named_joints
     reached = find_reached_values(closure)
-    return {
-        'reached': [
-            joint_range._asdict() | {'unit': joints[joint_range.joint].unit}
-            for joint_range in reached
-        ]
-    }
+    return {'reached': [span._asdict() | {'unit': joints[span.joint].unit} for span in reached]}
 
 
 def _is_reached(sweep: InputSweep, value: float) -> bool:

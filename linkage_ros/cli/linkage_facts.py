@@ -105,13 +105,11 @@ def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tu
     """Yield the limits, the range, its singular places and the worst residual."""
     for limits in account['limits']:
         yield 'limits', f'{limits["joint"]}: {_limits_text(limits, units)}'
-    for reached in account['reached']:
-        low, high = (
-            units.value_text(reached[end], reached['unit'] == 'rad') for end in ('low', 'high')
-        )
-        closing = '' if reached['closes'] else ', where the loops close'
-        within = f'within the limits of {", ".join(reached["within"])}{closing}'
-        yield 'reached', f'{reached["joint"]}: {low} to {high}, {within}'
+    for row in account['reached']:
+        low, high = (units.value_text(row[end], row['unit'] == 'rad') for end in ('low', 'high'))
+        closing = '' if row['closes'] else ', where the loops close'
+        within = f'within the limits of {", ".join(row["within"])}{closing}'
+        yield 'reached', f'{row["joint"]}: {low} to {high}, {within}'
     yield from _range_facts(account, units)
     worst = account['worst_residual']
     if worst is None:

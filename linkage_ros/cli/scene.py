@@ -133,14 +133,9 @@ def _list_stages(linkage: LinkagePipeline) -> Iterator[tuple[str, str, Any, tupl
     """Yield the stages of a tick in order: name, place, parameters, the effects that need it."""
     name, parameters = linkage.scene_linkage.drive
     yield name, 'drive', parameters, ()
-    effects = linkage.scene_linkage.effects
+    named = linkage.scene_linkage.effects
     for name, effect in linkage.wanted.effects.items():
-        yield (
-            name,
-            effect.place,
-            effect,
-            () if name in effects else effects_requiring(name, effects),
-        )
+        yield name, effect.place, effect, () if name in named else effects_requiring(name, named)
 
 
 def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:

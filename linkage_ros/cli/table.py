@@ -116,11 +116,7 @@ class Table(NamedTuple):
 
     def as_texts(self, units: DisplayUnits = DEGREES) -> Table:
         """Return the table as text."""
-        shown = [
-            numbered
-            for numbered in enumerate(self.typed_columns)
-            if numbered[1].heading is not None
-        ]
+        shown = [pair for pair in enumerate(self.typed_columns) if pair[1].heading is not None]
         return Table(
             self.title,
             [column.head(units) for _, column in shown],

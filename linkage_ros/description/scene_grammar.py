@@ -558,7 +558,7 @@ def scene_schema() -> Schema:
         {'name': name.json_schema(), 'linkage': linkage, **own},
         required=('name', 'linkage'),
     )
-    several = one_or_more('Several linkages instead of single.', single | _refused_pairs())
+    several = one_or_more('Several linkages instead of one.', single | _refused_pairs())
     keys = parameters_schema(SCENE)['properties'] | own
     return {
         '$schema': DIALECT,

@@ -297,10 +297,7 @@ class _UrdfReader:
             link = self._checked_link(end.get('link', ''), end.tag, where, links)
             own = (end.find('origin'), element.find(f'{end.tag}_origin'))
             origin = next((place for place in own if place is not None), end)
-            axis = next(
-                (line for line in map(element.find, axes) if line is not None),
-                None,
-            )
+            axis = next((line for line in map(element.find, axes) if line is not None), None)
             way = ends[0].axis if ends else (1.0, 0.0, 0.0)
             way = way if axis is None else self._read_vector(axis, 'xyz', where, '1 0 0')
             if way == (0.0, 0.0, 0.0):

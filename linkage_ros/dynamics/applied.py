@@ -87,10 +87,10 @@ class JointCoordinate(NamedTuple):
 def joint_coordinate(closure: PlanarClosure, name: str) -> JointCoordinate:
     """Return a driven or published joint of a linkage by its name."""
     linkage = closure.linkage
-    for index, given in enumerate(linkage.inputs):
-        if given.joint == name:
-            unit = closure.scale if given.slider else 1.0
-            return JointCoordinate(name, index, True, not given.slider, 1 + index, 0, unit)
+    for index, driven in enumerate(linkage.inputs):
+        if driven.joint == name:
+            unit = closure.scale if driven.slider else 1.0
+            return JointCoordinate(name, index, True, not driven.slider, 1 + index, 0, unit)
     joint, place = linkage.joints[name], list(linkage.joints).index(name)
     turns = isinstance(joint, RevoluteJoint)
     return JointCoordinate(name, place, False, turns, *closure.rate_term(place))
@@ -256,14 +256,14 @@ class AppliedForces:
         """Let a wrench act on each link that has one; ``count`` points precede theirs."""
         from linkage_ros.dynamics.wrenches import Component, HeldWrench  # local import: few scenes
 
-        for number, (link, given) in enumerate(applied.wrenches.items(), count):
-            self.wrenches[link] = held = HeldWrench(given.max_age, parts.wrench_numbers)
+        for number, (link, wrench) in enumerate(applied.wrenches.items(), count):
+            self.wrenches[link] = held = HeldWrench(wrench.max_age, parts.wrench_numbers)
             place, dot = self._tracker.indices[number], parts.vectors.dot
             along: list[Loaded] = [
                 LoadedPoint(link, number, place, axis, dot)
-                for axis in parts.axes(link, given.frame)
+                for axis in parts.axes(link, wrench.frame)
             ]
-            along += parts.turns(link, given.frame)
+            along += parts.turns(link, wrench.frame)
             for component, at in enumerate(along):
                 self._components.append((at, Component(held, component)))
 
@@ -406,11 +406,12 @@ class AppliedForces:
             pull = spring.stiffness * _spring_stretch(joint, spring, position)
             pull += spring.damping * rate
             needed = [
-                one + pull * lever for one, lever in zip(needed, levers_of(joint), strict=True)
+                effort + pull * lever
+                for effort, lever in zip(needed, levers_of(joint), strict=True)
             ]
         for at, force in self._constant:
             needed = [
-                one - force * lever for one, lever in zip(needed, levers_of(at), strict=True)
+                effort - force * lever for effort, lever in zip(needed, levers_of(at), strict=True)
             ]
         laws = [
             (levers_of(at), of.value(position), of.lever(velocity, position, ()))
@@ -445,14 +446,14 @@ class AppliedForces:
         return (seconds, *chain.from_iterable(held.wrench for held in self.wrenches.values()))
 
     def acting_loads(
-        self, position: Position, velocity: Velocity, given: Sequence[float]
+        self, position: Position, velocity: Velocity, load_values: Sequence[float]
     ) -> Iterator[tuple[Loaded, float]]:
         """
         Yield each load, where it acts and how strong, in [N·m] or [N].
 
-        ``given`` begins as `given_after`; empty for the begin, and the wrenches now.
+        ``load_values`` begin as `given_after`; empty for the begin, and the wrenches now.
         """
-        seconds, *numbers = given[: self.given_count] or self.given_after(0.0)
+        seconds, *numbers = load_values[: self.given_count] or self.given_after(0.0)
         for joint, spring in self._springs:
             rate = joint.lever(velocity, position, ())
             stretch = _spring_stretch(joint, spring, position)
@@ -468,11 +469,11 @@ class AppliedForces:
         position: Position,
         velocity: Velocity,
         virtual: Velocity,
-        given: Sequence[float],
+        load_values: Sequence[float],
     ) -> float:
         """Return the work of the loads over a virtual velocity; arguments as in `acting_loads`."""
         moved, work = self._point_velocities(position, virtual), 0.0
-        for at, force in self.acting_loads(position, velocity, given):
+        for at, force in self.acting_loads(position, velocity, load_values):
             work += force * at.lever(virtual, position, moved)
         return work
 
@@ -522,7 +523,7 @@ def _check_loads(closure: PlanarClosure, applied: AppliedLoads) -> None:
                 'the joint has no limits',
                 'write limits: [low, high] for it into the linkage file',
             )
-    units = {given.joint: given.unit for given in linkage.inputs}
+    units = {driven.joint: driven.unit for driven in linkage.inputs}
     units |= {name: joint.unit for name, joint in linkage.joints.items()}
     loads: list[tuple[str, JointLoad | PointLoad, str]] = []
     loads += [

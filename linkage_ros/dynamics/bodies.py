@@ -57,8 +57,8 @@ class Vectors(NamedTuple):
     unit_moments: tuple[Callable[[Any], tuple[float | None, ...]], ...]
 
 
-def _dot(one: complex, other: complex) -> float:
-    return one.real * other.real + one.imag * other.imag
+def _dot(first: complex, second: complex) -> float:
+    return first.real * second.real + first.imag * second.imag
 
 
 PLANE = Vectors(

@@ -122,15 +122,15 @@ def independent_slips(matrix: Sequence[Sequence[float]], numbers: Sequence[int])
     """Return those of some joints whose slips determine those of all of them."""
     left = {i: {j: matrix[i][j] for j in numbers} for i in numbers}
     least = _STILL * max((matrix[i][i] for i in numbers), default=0.0)
-    found = []
+    pivots = []
     while left:
         pivot = max(left, key=lambda i: left[i][i])
         if not left[pivot][pivot] > least:
             break
-        found.append(pivot)
+        pivots.append(pivot)
         row = left.pop(pivot)
-        for other in left.values():
-            factor = other[pivot] / row[pivot]
+        for lower_row in left.values():
+            factor = lower_row[pivot] / row[pivot]
             for j in left:
-                other[j] -= factor * row[j]
-    return sorted(found)
+                lower_row[j] -= factor * row[j]
+    return sorted(pivots)

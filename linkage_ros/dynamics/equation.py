@@ -181,14 +181,14 @@ class Mechanics:
         """Laws of the forces, in the order of ``Terms.laws``."""
         self.stribeck_joints = tuple(rubbing for rubbing in self.friction_joints if rubbing.law)
         """The joints whose friction falls with the rate; their laws are the last ones."""
-        self.dry_joints = tuple(one for one in self.friction_joints if one.friction.is_dry)
+        self.dry_joints = tuple(joint for joint in self.friction_joints if joint.friction.is_dry)
         """The joints with dry friction."""
         self.stopped_joints = _find_stopped(closure, self.loads)
         """Of several inputs, the other joints with hard stops, by name, with their limits."""
         sticks = any(rubbing.friction.breakaway_excess for rubbing in self.friction_joints)
         self._has_no_laws = not sticks and self.applied is None
         """Whether the equation has neither laws nor an excess of friction at rest."""
-        self._units = tuple(closure.scale if given.slider else 1.0 for given in linkage.inputs)
+        self._units = tuple(closure.scale if driven.slider else 1.0 for driven in linkage.inputs)
 
     def motion_terms(self, position: Position) -> Terms | None:
         """
@@ -334,9 +334,9 @@ class Mechanics:
             return None
         laws: tuple[InputLawTerm, ...] = ()
         if self.applied is not None:
-            more, found = self.applied.several_inputs(position, velocity, alone)
-            bias = tuple(one + other for one, other in zip(bias, more, strict=True))
-            laws = tuple(InputLawTerm(*law) for law in found)
+            more, law_values = self.applied.several_inputs(position, velocity, alone)
+            bias = tuple(first + second for first, second in zip(bias, more, strict=True))
+            laws = tuple(InputLawTerm(*law) for law in law_values)
         if not (self.dry_joints or self.stopped_joints):
             return InputTerms(matrix, mobility, bias, laws)
         return InputTerms(
@@ -351,12 +351,12 @@ class Mechanics:
         row: tuple[float, ...] = ()
         for speeds, turns in zip(moved, turned, strict=True):
             inertia = self.loads.drive_inertia if len(row) == len(moved) - 1 else 0.0
-            for (mass, gyration, point), one, other in zip(
+            for (mass, gyration, point), first, second in zip(
                 self._bodies, turned[-1], turns, strict=True
             ):
                 carried = vectors.scale(mass, moved[-1][point])
                 inertia += vectors.dot(carried, speeds[point])
-                inertia += vectors.turn_dot(vectors.momentum(gyration, one), other)
+                inertia += vectors.turn_dot(vectors.momentum(gyration, first), second)
             row += (inertia,)
         return row
 
@@ -374,8 +374,8 @@ class Mechanics:
         ways = [way.state.coordinates for way in alone]
         v, a = velocity.state.coordinates, still.state.coordinates
         slips = tuple(
-            Slip(tuple(map(one.slip_rate, ways)), one.slip_rate(v), one.slip_rate(a))
-            for one in self.dry_joints
+            Slip(tuple(map(joint.slip_rate, ways)), joint.slip_rate(v), joint.slip_rate(a))
+            for joint in self.dry_joints
         )
         for name in self.stopped_joints:
             joint = joint_coordinate(self.closure, name)
@@ -409,10 +409,10 @@ class Mechanics:
         fast, close, terms_at = compiled.fast, self.closure.close_unlimited, self.input_terms
 
         def equation(values: Sequence[float], rates: Sequence[float]) -> InputTerms | None:
-            found = fast(*values, *rates)
-            if found is None:
+            terms = fast(*values, *rates)
+            if terms is None:
                 return terms_at(close(*values), rates)
-            matrix, *mobility, bias, numbers, rubbing, stopped = found
+            matrix, *mobility, bias, numbers, rubbing, stopped = terms
             laws = tuple([InputLawTerm(*at) for at in take_parts(numbers, 2)])
             if not (rubbing or stopped):
                 return InputTerms(matrix, tuple(mobility), bias, laws)
@@ -499,14 +499,14 @@ class Mechanics:
         position: Position,
         velocity: Velocity,
         acceleration: Acceleration,
-        given: Sequence[float] = (),
+        load_values: Sequence[float] = (),
     ) -> tuple[float, ...]:
         """
         Return the effort of each drive for a motion, against inertia, loads and friction.
 
         Each is a moment in [N·m], or a force in [N] if the input slides, positive if it drives the
         input forward; Coulomb friction is 0 in a joint at rest. The position is closed and not a
-        toggle. ``given`` is as in `linkage_ros.dynamics.applied.AppliedForces.given_after`.
+        toggle. ``load_values`` are as in `linkage_ros.dynamics.applied.AppliedForces.given_after`.
         """
         points, vectors, count = self._points, self.model.vectors, len(self._units)
         places = points.places(position)
@@ -540,7 +540,7 @@ class Mechanics:
             for drag, rubbing in zip(drags, self.friction_joints, strict=True):
                 effort += drag * rubbing.slip_rate(w)
             if self.applied is not None:
-                effort -= self.applied.virtual_work(position, velocity, virtual, given)
+                effort -= self.applied.virtual_work(position, velocity, virtual, load_values)
             if self.friction.holds and count > 1:
                 moved_by.append(moved)
                 turned_by.append(turned)
@@ -557,8 +557,8 @@ class Mechanics:
         if not (self.friction.holds and count > 1):
             return efforts
         limits = [
-            where(_is_at_rest(v, one.one, one.other), one.friction.holding, 0.0)
-            for one in self.dry_joints
+            where(_is_at_rest(v, joint.one, joint.other), joint.friction.holding, 0.0)
+            for joint in self.dry_joints
         ]
         rest = call(self._efforts_beside_friction, *efforts, *matrix, *levers, *limits)
         return tuple(rest[i] for i in range(count))
@@ -601,11 +601,11 @@ class Mechanics:
         joints, stops = self.closure.linkage.joints, self.stopped_joints
         return tuple(
             JointStop(
-                one.low,
-                one.high,
-                0.5 * (one.low + one.high) if joints[name].unit == 'rad' else None,
+                limits.low,
+                limits.high,
+                0.5 * (limits.low + limits.high) if joints[name].unit == 'rad' else None,
             )
-            for name, one in stops.items()
+            for name, limits in stops.items()
         )
 
     def check_curves(self, places: Sequence[Terms], method: str, step: float) -> None:
@@ -677,21 +677,24 @@ class Mechanics:
         for index, joint in enumerate(closure.structure.joints if joints else ()):
             if joint.name not in joints:
                 continue
-            one, other = closure.angles[joint.link].coordinate, closure.angles[joint.to].coordinate
+            first, second = (
+                closure.angles[joint.link].coordinate,
+                closure.angles[joint.to].coordinate,
+            )
             factor = 1.0
             if joint.kind == 'P':
                 slide = closure.slides[joint.name]
-                one, other, factor = slide.coordinate, 0, slide.sign * closure.scale
-            yield joint.name, index, joints[joint.name], one, other, factor
+                first, second, factor = slide.coordinate, 0, slide.sign * closure.scale
+            yield joint.name, index, joints[joint.name], first, second, factor
 
     def _find_friction_joints(self) -> Iterator[FrictionJoint]:
-        for name, index, friction, one, other, factor in self._find_rubbing_joints():
+        for name, index, friction, first, second, factor in self._find_rubbing_joints():
             law = None
             if friction.breakaway_excess and friction.stribeck:
                 from linkage_ros.dynamics.laws import Stribeck  # local import: only with it
 
                 law = Stribeck(friction.breakaway_excess, friction.stribeck)
-            yield FrictionJoint(name, index, friction, one, other, factor, law)
+            yield FrictionJoint(name, index, friction, first, second, factor, law)
 
 
 def solve_positive(rows: Sequence[Sequence[float]], right: Sequence[float]) -> list[float] | None:
@@ -740,11 +743,11 @@ def _bodies_of(closure: Any, loads: Loads) -> BodyModel:
 
 
 def _find_stopped(closure: PlanarClosure, loads: Loads) -> dict[str, Limits]:
-    """Return the limits of joints with hard stops that are no inputs, of several inputs."""
-    inputs = [given.joint for given in closure.linkage.inputs]
+    """Return the limits of joints with hard stops that are not inputs, of several inputs."""
+    inputs = [driven.joint for driven in closure.linkage.inputs]
     yielding = (*inputs, *loads.applied.stops)
     limits = closure.linkage.limits.items() if len(inputs) > 1 else ()
-    return {name: one for name, one in limits if one.is_bounded and name not in yielding}
+    return {name: bounds for name, bounds in limits if bounds.is_bounded and name not in yielding}
 
 
 def _make_applied(closure: PlanarClosure, loads: Loads) -> AppliedForces | None:
@@ -775,7 +778,7 @@ def slip_direction(joint: FrictionJoint, v: list[float]) -> float:
     return where(_is_at_rest(v, joint.one, joint.other), 0.0, copysign(1.0, joint.slip_rate(v)))
 
 
-def _is_at_rest(v: list[float], one: int, other: int) -> bool:
+def _is_at_rest(v: list[float], first: int, second: int) -> bool:
     """Return whether the difference of two rates is 0 within rounding."""
-    rates = abs(v[one]) + abs(v[other]) + abs(v[1])
-    return abs(v[one] - v[other]) <= _ROUNDING * rates
+    rates = abs(v[first]) + abs(v[second]) + abs(v[1])
+    return abs(v[first] - v[second]) <= _ROUNDING * rates

@@ -119,7 +119,7 @@ def planar_forms(closure: PlanarClosure) -> JointForms:
         if isinstance(joint, RevoluteJoint)
         else joints[sliders[joint.slider]].motion(sliders[joint.slider])
         for name, joint in (
-            *((given.joint, given.as_joint()) for given in linkage.inputs),
+            *((driven.joint, driven.as_joint()) for driven in linkage.inputs),
             *linkage.joints.items(),
         )
     }

@@ -65,10 +65,10 @@ class JointMatrix:
         self._vectors, self._places, self._scale = vectors, places, scale
         self.force_rows = len(vectors.coordinates(vectors.zero))
         self.moment_rows = len(vectors.unit_moments[0](vectors.zero))
-        each = self.force_rows + self.moment_rows
+        rows_of_link = self.force_rows + self.moment_rows
         # For each link that moves its first row.
-        self.rows = {link: each * i for i, link in enumerate(forms.links)}
-        self.size = each * len(self.rows)
+        self.rows = {link: rows_of_link * i for i, link in enumerate(forms.links)}
+        self.size = rows_of_link * len(self.rows)
         # For each link the index of the place about which its moments are.
         self.pivots: dict[str, int] = {}
         for joint, place in zip(forms.joints, places, strict=True):
@@ -166,11 +166,11 @@ class JointMatrix:
             elimination = Elimination([*zip(*rows, strict=True)] if transposed else rows, ())
             if any(divisor == 0.0 for divisor in elimination.divisors):
                 return []
-            found = [
+            groups = [
                 self._with_others(elimination.solve(side))
                 for side in split_numbers(numbers[count:], self.size)
             ]
-            return [*chain(*found)] if select is None else select(found)
+            return [*chain(*groups)] if select is None else select(groups)
 
         line = compile_function(solve, count + number * self.size)
 

@@ -72,9 +72,9 @@ class TorqueTable:
         begin, force = rows[segment - 1]
         if segment == len(rows):
             return force
-        end, other = rows[segment]
+        end, next_force = rows[segment]
         return force + (self._force_at(value, rate, time) - begin) / (end - begin) * (
-            other - force
+            next_force - force
         )
 
     def _force_at(self, value: float, rate: float, time: float) -> float:

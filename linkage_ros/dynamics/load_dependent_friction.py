@@ -88,8 +88,8 @@ class FrictionSolver:
     def _joint_forces(self, solutions: Sequence[Sequence[Any]]) -> list[Any]:
         forces: list[Any] = []
         for first, both, _ in self._unknowns:
-            for one in solutions:
-                forces += (one[first], one[first + 1] if both else 0.0)
+            for solution in solutions:
+                forces += (solution[first], solution[first + 1] if both else 0.0)
         return forces
 
     def solve_pressed(self, *numbers: float) -> list[float] | None:
@@ -102,12 +102,12 @@ class FrictionSolver:
         if flat is None:
             return None
         free, *units = split_numbers(flat, len(self._matrix.columns))
-        found = self.solve_by_forces(self._joint_forces([free, *units]))
-        if found is None:
+        frictions = self.solve_by_forces(self._joint_forces([free, *units]))
+        if frictions is None:
             return None
-        for friction, unit in zip(found, units, strict=True):
+        for friction, unit in zip(frictions, units, strict=True):
             free = [force + friction * more for force, more in zip(free, unit, strict=True)]
-        return [*free, *found]
+        return [*free, *frictions]
 
     def improve_sliding(
         self,
@@ -207,17 +207,17 @@ class FrictionSolver:
         begin = compile_function(begin_sliding, length)
 
         def solve_sliding(*numbers: float) -> Sequence[float] | None:
-            (found,) = begin(*numbers)
-            return self._iterate(found[:count], found[count:])
+            (values,) = begin(*numbers)
+            return self._iterate(values[:count], values[count:])
 
         return solve_sliding
 
     def _iterate(self, sizes: Sequence[float], moved: Sequence[float]) -> Sequence[float] | None:
         """Return frictions, of which what is small is given, by forces without and by them."""
         count = self._count
-        found: Sequence[float] = (0.0,) * count
+        frictions: Sequence[float] = (0.0,) * count
         for _ in range(_MOST_STEPS // self._steps):
-            improved = self._improve(*found, *moved)
+            improved = self._improve(*frictions, *moved)
             if improved is None:
                 return None
             (numbers,) = improved
@@ -227,7 +227,7 @@ class FrictionSolver:
         return None
 
     def _begin_forces(self, *numbers: Any) -> list[Any]:
-        """Return what is small beside each friction, and each force without and by frictions."""
+        """Return what is small for each friction, and each force without and by frictions."""
         count = self._count
         begin = 2 * count * (count + 2)
         *levers, pull, mobility = numbers[begin:]
@@ -247,18 +247,18 @@ class FrictionSolver:
     def _improve_frictions(self, *numbers: Any) -> list[Any]:
         """Return frictions after some Newton steps, and what of each is missing then."""
         count = self._count
-        found, forces = [*numbers[:count]], numbers[count:]
+        frictions, forces = [*numbers[:count]], numbers[count:]
         for _ in range(self._steps):
-            missing, slopes = self._missing(found, forces)
+            missing, slopes = self._missing(frictions, forces)
             steps = _solve_dominant(slopes, missing)
             if not steps:
                 return []
-            found = [now + step for now, step in zip(found, steps, strict=True)]
-        missing, _ = self._missing(found, forces)
-        return [*found, *missing]
+            frictions = [now + step for now, step in zip(frictions, steps, strict=True)]
+        missing, _ = self._missing(frictions, forces)
+        return [*frictions, *missing]
 
     def _missing(
-        self, found: Sequence[Any], forces: Sequence[Any]
+        self, frictions: Sequence[Any], forces: Sequence[Any]
     ) -> tuple[list[Any], list[list[Any]]]:
         """Return what is missing of each friction, and how it falls with each of them."""
         count = self._count
@@ -266,11 +266,11 @@ class FrictionSolver:
         for i, piece in enumerate(split_numbers(forces, 2 * (count + 1))):
             _, _, factor = self._unknowns[i]
             x, y, *units = piece
-            for k, friction in enumerate(found):
+            for k, friction in enumerate(frictions):
                 x, y = x + friction * units[2 * k], y + friction * units[2 * k + 1]
             size = abs(make_vector(x, y))
             along = factor / where(size > 0.0, size, 1.0)
-            missing.append(factor * size - found[i])
+            missing.append(factor * size - frictions[i])
             falls = [along * (x * units[2 * k] + y * units[2 * k + 1]) for k in range(count)]
             slopes.append([float(i == k) - fall for k, fall in enumerate(falls)])
         return missing, slopes
@@ -311,9 +311,9 @@ def _solve_dominant(matrix: Sequence[Sequence[Any]], right: Sequence[Any]) -> li
     return solution
 
 
-def _sum_products(one: Sequence[Any], other: Sequence[Any]) -> Any:
+def _sum_products(first: Sequence[Any], second: Sequence[Any]) -> Any:
     """Return the scalar product, as far as both go."""
-    return reduce(add, map(mul, one, other))
+    return reduce(add, map(mul, first, second))
 
 
 class Pressing(NamedTuple):

@@ -351,11 +351,11 @@ def _check_friction(linkage: Linkage | SpaceLinkage, friction: Friction) -> None
 
 def _check_radius(name: str, joint: JointFriction) -> None:
     if bool(joint.coefficient) != bool(joint.radius):
-        given, missing = (
+        present, missing = (
             ('coefficient', 'radius') if joint.coefficient else ('radius', 'coefficient')
         )
         raise DefinitionError(
-            f'effects.friction.joints.{name}.{given}',
+            f'effects.friction.joints.{name}.{present}',
             f'friction by the force in a pin needs both, and {missing} is missing',
             f'write {missing} too',
         )
@@ -373,7 +373,7 @@ def _check_holds(friction: Friction) -> None:
 
 
 def _check_friction_in_space(linkage: SpaceLinkage, friction: Friction) -> None:
-    """Refuse friction of what is no joint, and friction by a force that a joint does not bear."""
+    """Refuse friction of what is not a joint, or by a force that a joint does not bear."""
     known = (*linkage.driven, *(name for name in linkage.published if name not in linkage.driven))
     for name, joint in friction.joints.items():
         key = f'effects.friction.joints.{name}'

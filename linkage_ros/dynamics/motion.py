@@ -278,10 +278,10 @@ class SingleDofMechanism:
             segments = self._law_segments(motion, now, sense) if laws and cuts else ()
             reach = self._step_function(motion, now, force, sense * brake, sense, slips, segments)
             piece = now, sense, sticks, slips, segments
-            found = end_of_piece(self, piece, reach, motion, left, seconds * SHORTEST)
-            if found is None:
+            end = end_of_piece(self, piece, reach, motion, left, seconds * SHORTEST)
+            if end is None:
                 return self._bounce(motion)
-            length, reached, event = found
+            length, reached, event = end
             if event is _Event.SEGMENT:
                 # The next segment begins just beyond, at a time that differs when it is rounded.
                 length = min(length + 2.0 * ulp(time + seconds), left)

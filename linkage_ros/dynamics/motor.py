@@ -162,10 +162,10 @@ class Motor:
         wanted, supply = self._wanted_current(command), self._supply_limits()
         limits: list[Line] = [(-self.max_current, 0.0), (self.max_current, 0.0), *supply]
         lossy = self.forward < 1.0 or self.backward < 1.0
-        found = {_crossing_rate(*pair) for pair in combinations([wanted, *limits], 2)}
+        crossings = {_crossing_rate(*pair) for pair in combinations([wanted, *limits], 2)}
         if lossy:
-            found |= {0.0, *(_crossing_rate(line, (0.0, 0.0)) for line in (wanted, *limits))}
-        rates = sorted(rate for rate in found if abs(rate) <= LARGEST)
+            crossings |= {0.0, *(_crossing_rate(line, (0.0, 0.0)) for line in (wanted, *limits))}
+        rates = sorted(rate for rate in crossings if abs(rate) <= LARGEST)
         still = _evaluate_line(self._current_line(wanted, supply, 0.0), 0.0)
         to_input = self.ratio * self.constant
         holding = 0.5 * to_input * abs(still) * (1.0 / self.backward - self.forward)
@@ -235,10 +235,10 @@ def _evaluate_line(line: Line, rate: float) -> float:
     return start + slope * rate
 
 
-def _crossing_rate(one: Line, other: Line) -> float:
+def _crossing_rate(first: Line, second: Line) -> float:
     """Return the rate at which two lines cross; infinity if they are parallel."""
-    slope = one[1] - other[1]
-    return (other[0] - one[0]) / slope if slope else inf
+    slope = first[1] - second[1]
+    return (second[0] - first[0]) / slope if slope else inf
 
 
 def _rates_between(rates: list[float]) -> list[float]:

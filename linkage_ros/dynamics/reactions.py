@@ -209,15 +209,15 @@ class Reactions:
         position: Position,
         velocity: Velocity,
         acceleration: Acceleration,
-        given: Sequence[float] = (),
+        load_values: Sequence[float] = (),
     ) -> tuple[JointReaction, ...] | None:
         """
         Return the reaction in each joint, in the order of `names`: of each what is certain.
 
-        Return None at a toggle and where the linkage does not close. ``given`` is as in
+        Return None at a toggle and where the linkage does not close. ``load_values`` are as in
         `linkage_ros.dynamics.applied.AppliedForces.given_after`.
         """
-        balance = self._solve_balance(position, velocity, acceleration, given)
+        balance = self._solve_balance(position, velocity, acceleration, load_values)
         if balance is None:
             return None
         unknowns, resistances = balance
@@ -280,7 +280,7 @@ class Reactions:
         position: Position,
         velocity: Velocity,
         acceleration: Acceleration,
-        given: Sequence[float] = (),
+        load_values: Sequence[float] = (),
     ) -> tuple[float, ...]:
         """
         Return the effort of each drive; empty where there are no forces.
@@ -288,7 +288,7 @@ class Reactions:
         It is as in `Mechanics.drive_efforts`, plus the friction that grows with the forces in the
         joints. The parameters are as in `solve`.
         """
-        balance = self._solve_balance(position, velocity, acceleration, given)
+        balance = self._solve_balance(position, velocity, acceleration, load_values)
         if balance is None:
             return ()
         unknowns, _ = balance
@@ -356,23 +356,23 @@ class Reactions:
         friction, and of each with a hard stop; none where there are no forces.
         """
         applied = self._mechanics.applied
-        given = () if applied is None else applied.given_after(seconds)
-        found: Sequence[Sequence[float]] | None = self._compiled_presses.fast(
-            *values, *rates, *given
+        load_values = () if applied is None else applied.given_after(seconds)
+        coefficients: Sequence[Sequence[float]] | None = self._compiled_presses.fast(
+            *values, *rates, *load_values
         )
-        if found is None:
+        if coefficients is None:
             position = self._mechanics.closure.close_unlimited(*values)
             if position.status not in _SOLVED:
                 return ()
-            found = self._press_coefficients(position, rates, given)
-        return found[0] if found else ()
+            coefficients = self._press_coefficients(position, rates, load_values)
+        return coefficients[0] if coefficients else ()
 
     @cached_property
     def _compiled_presses(self) -> Compiled:
         inputs = len(self._mechanics.closure.input_names)
 
-        def list_outputs(motion: CompiledMotion, *given: float) -> Sequence[Sequence[float]]:
-            return self._press_coefficients(motion.position, given[:inputs], given[inputs:])
+        def list_outputs(motion: CompiledMotion, *numbers: float) -> Sequence[Sequence[float]]:
+            return self._press_coefficients(motion.position, numbers[:inputs], numbers[inputs:])
 
         applied = self._mechanics.applied
         count = inputs + (0 if applied is None else len(applied.given_after(0.0)))
@@ -381,11 +381,13 @@ class Reactions:
         )
 
     def _press_coefficients(
-        self, position: Position, rates: Sequence[float], given: Sequence[float]
+        self, position: Position, rates: Sequence[float], load_values: Sequence[float]
     ) -> Sequence[Sequence[float]]:
         mechanics, places = self._mechanics, self._follower.places(position)
         velocity = mechanics.closure.velocity(position, *rates)
-        columns, _ = self._sides_by_accelerations(position, velocity, places, given, dry=False)
+        columns, _ = self._sides_by_accelerations(
+            position, velocity, places, load_values, dry=False
+        )
         actions = [self._motion(rubbing) for rubbing in mechanics.dry_joints]
         actions += [self._forms.efforts[name] for name in mechanics.stopped_joints]
         for action in actions:
@@ -523,7 +525,7 @@ class Reactions:
         position: Position,
         velocity: Velocity,
         places: list[Any],
-        given: Sequence[float],
+        load_values: Sequence[float],
         dry: bool = True,
     ) -> tuple[list[float], list[float]]:
         """
@@ -539,14 +541,16 @@ class Reactions:
                 velocity,
                 closure.acceleration(position, velocity, *[float(n == k) for n in range(count)]),
                 places,
-                given,
+                load_values,
                 dry,
             )[0]
             for k in range(-1, count)
         ]
         columns = still[:size]
         for sides in moved:
-            columns += [one - other for one, other in zip(sides[:size], still[:size], strict=True)]
+            columns += [
+                first - second for first, second in zip(sides[:size], still[:size], strict=True)
+            ]
         return columns, still[size:]
 
     def _solve_balance(
@@ -554,13 +558,15 @@ class Reactions:
         position: Position,
         velocity: Velocity,
         acceleration: Acceleration,
-        given: Sequence[float] = (),
+        load_values: Sequence[float] = (),
     ) -> tuple[list[float], list[float]] | None:
         """Return the solution of the system, and the friction in each joint."""
         if position.status not in _SOLVED:
             return None
         places = self._follower.places(position)
-        sides, resistances = self._right_sides(position, velocity, acceleration, places, given)
+        sides, resistances = self._right_sides(
+            position, velocity, acceleration, places, load_values
+        )
         solve = self._frictions.solve_pressed if self._load_dependent else self._solve_forces
         unknowns = call(solve, *self._matrix.varying_at(position, places), *sides)
         if not has_result(unknowns):
@@ -576,7 +582,7 @@ class Reactions:
         velocity: Velocity,
         acceleration: Acceleration,
         places: list[Any],
-        given: Sequence[float],
+        load_values: Sequence[float],
         dry: bool = True,
     ) -> tuple[list[float], list[float]]:
         """
@@ -620,7 +626,7 @@ class Reactions:
                         self._apply_force(sides, link, at[point], push, places)
         if mechanics.applied is not None:
             loaded = mechanics.applied.places(position)
-            for on, load in mechanics.applied.acting_loads(position, velocity, given):
+            for on, load in mechanics.applied.acting_loads(position, velocity, load_values):
                 self._apply_load(sides, on, load, position, places, loaded)
         resistances = [0.0] * len(self.joints)
         for rubbing in mechanics.friction_joints:
@@ -750,8 +756,8 @@ class Reactions:
         for number in range(_STATES):
             off = 0.1 * number * self._scale
             inputs = [
-                value + (off if given.slider else 0.1 * number) * sin(1.0 + 2.4 * k + number)
-                for k, (value, given) in enumerate(zip(pose, closure.linkage.inputs, strict=True))
+                value + (off if driven.slider else 0.1 * number) * sin(1.0 + 2.4 * k + number)
+                for k, (value, driven) in enumerate(zip(pose, closure.linkage.inputs, strict=True))
             ]
             position = closure.close_unlimited(*inputs)
             if position.status.has_rates:

@@ -48,13 +48,13 @@ def find_certain(
     ``states`` have the matrix of the forces at some positions, ``first`` the first unknown of each
     joint. The unknowns that are not solved for are 0.
     """
-    found = [(_idle_forces(np.array(rows)), position) for rows, position in states]
-    found = [(idle, position) for idle, position in found if len(idle)]
+    idle_forces = [(_idle_forces(np.array(rows)), position) for rows, position in states]
+    idle_forces = [(idle, position) for idle, position in idle_forces if len(idle)]
     parts = []
     for joint, begin in zip(joints, first, strict=True):
         middle, end = begin + len(joint.forces), begin + len(joint.forces) + len(joint.moments)
         seen = []
-        for idle, position in found:
+        for idle, position in idle_forces:
             axis = None if joint.axis is None else _vector(joint.axis, position)
             force = idle[:, begin:middle] @ _directions(joint.forces, position)
             moment = idle[:, middle:end] @ _directions(joint.moments, position)
@@ -67,7 +67,7 @@ def find_certain(
                 _certain_part([(moment, axis) for _, moment, axis in seen]),
             )
         )
-    return _independent_columns([idle for idle, _ in found]), parts
+    return _independent_columns([idle for idle, _ in idle_forces]), parts
 
 
 def _directions(ways: Sequence[Direction], position: Position) -> Array:

@@ -193,8 +193,8 @@ class SeveralDofMechanism:
     ) -> InputVector:
         """Return q̈, in [rad/s²] or [m/s²]; the parameters are as in `advance`."""
         piece = self._begin_piece(motion, InputVector(force), tuple(brakes), time, cuts=False)
-        found = self._accelerate(motion.terms, motion.rate, time, piece)
-        return InputVector([0.0] * len(motion.value)) if found is None else found
+        acceleration = self._accelerate(motion.terms, motion.rate, time, piece)
+        return InputVector([0.0] * len(motion.value)) if acceleration is None else acceleration
 
     def advance(
         self,
@@ -227,10 +227,10 @@ class SeveralDofMechanism:
             reach = self._step_function(motion, piece)
             if self._is_held_at_toggle(motion, reach, left):
                 return _at_rest(motion)._replace(coarse=coarse, spare=min(saved, _SPARE))
-            found = end_of_piece(self, piece, reach, motion, left, seconds * SHORTEST)
-            if found is None:
+            end = end_of_piece(self, piece, reach, motion, left, seconds * SHORTEST)
+            if end is None:
                 return self._bounce(motion)._replace(coarse=coarse, spare=min(saved, _SPARE))
-            length, reached, event = found
+            length, reached, event = end
             if event and event.kind in ('leave', 'segment', 'break', 'halt'):
                 cuts += 1
                 # The next piece begins just beyond, at a time that differs when it is rounded.
@@ -402,8 +402,8 @@ class SeveralDofMechanism:
                 for j, new in bound.items()
             ):
                 break
-        found = zip(resting, accelerations, strict=True)
-        return {j: copysign(1.0, slipping) for j, slipping in found if slipping}
+        accelerated = zip(resting, accelerations, strict=True)
+        return {j: copysign(1.0, slipping) for j, slipping in accelerated if slipping}
 
     @staticmethod
     def _rows(slips: Mapping[int, Slip]) -> dict[int, InputVector]:
@@ -420,13 +420,13 @@ class SeveralDofMechanism:
         }
 
     def _weights(
-        self, one: float, change: InputVector, resisted: Mapping[int, float]
+        self, weight: float, change: InputVector, resisted: Mapping[int, float]
     ) -> list[float]:
         """Return the weights of `Pressing.forces_by`."""
         assert self.pressing is not None
         stops = [self._first_stop + k for k in range(len(self.joint_stops))]
         numbers = [*range(len(self.frictions)), *stops]
-        return [one, *change[: self.pressing.inputs], *[resisted.get(j, 0.0) for j in numbers]]
+        return [weight, *change[: self.pressing.inputs], *[resisted.get(j, 0.0) for j in numbers]]
 
     def _press_frictions(
         self, presses: Sequence[float], change: InputVector, resisted: Mapping[int, float]
@@ -492,10 +492,10 @@ class SeveralDofMechanism:
             of = dict(zip(units, by_unit, strict=True))
             for pair in (without, *(of.get(k, (0.0, 0.0)) for k in joints)):
                 numbers += pair if j in units else (0.0, 0.0)
-        found = self.pressing.solver.solve_by_forces(numbers)
-        if found is None:
+        frictions_found = self.pressing.solver.solve_by_forces(numbers)
+        if frictions_found is None:
             return None
-        frictions = dict(zip(joints, found, strict=True))
+        frictions = dict(zip(joints, frictions_found, strict=True))
         force, parts = whole.force, dict(whole.parts)
         for j, unit in units.items():
             force += frictions[j] * unit.force
@@ -526,12 +526,12 @@ class SeveralDofMechanism:
             for sense, friction, slip in zip(senses, self.frictions, slips, strict=True)
         ]
         rows = [slip.levers for slip in slips]
-        found = self.pressing.solve_sliding(
+        frictions_found = self.pressing.solve_sliding(
             *presses, *chain(*terms.mobility), *chain(*rows), *senses, *force, *resisted
         )
-        if found is None:
+        if frictions_found is None:
             return None
-        for j, friction in zip(self.pressing.joints, found, strict=True):
+        for j, friction in zip(self.pressing.joints, frictions_found, strict=True):
             resisted[j] -= senses[j] * friction
         return _Resolved(
             InputVector(
@@ -640,8 +640,8 @@ class SeveralDofMechanism:
         if not piece.sticking and self.pressing is None:
             return self._free_acceleration(terms, self._force(terms, rate, time, piece), piece)
         resolved = self._resolve(terms, rate, time, piece)
-        found = resolved and self._free_acceleration(terms, resolved.force, piece)
-        return None if found is None else self._without_braked(found, piece)
+        acceleration = resolved and self._free_acceleration(terms, resolved.force, piece)
+        return None if acceleration is None else self._without_braked(acceleration, piece)
 
     def _without_braked(self, change: InputVector, piece: _Piece) -> InputVector:
         """Return rates or accelerations of which those are 0, not nearly, that a brake holds."""
@@ -654,8 +654,8 @@ class SeveralDofMechanism:
 
     def _move(self, terms: InputTerms, force: InputVector, piece: _Piece) -> InputVector:
         """Return q̈ under a force alone; 0 where there is none."""
-        found = self._free_acceleration(terms, force, piece)
-        return InputVector([0.0] * len(force)) if found is None else found
+        acceleration = self._free_acceleration(terms, force, piece)
+        return InputVector([0.0] * len(force)) if acceleration is None else acceleration
 
     def _free_acceleration(
         self, terms: InputTerms, force: InputVector, piece: _Piece
@@ -669,8 +669,8 @@ class SeveralDofMechanism:
         if solved is None:
             return None
         change = [0.0] * len(force)
-        for n, found in zip(free, solved, strict=True):
-            change[n] = found
+        for n, part in zip(free, solved, strict=True):
+            change[n] = part
         return InputVector(change)
 
     def _step_function(

@@ -66,8 +66,8 @@ def behind_play(
         for at, (driven, play) in enumerate(plays.items(), count):
             own = tuple(float(n == at) for n in range(count + len(more)))
             matrix += (*own[:at], play.inertia)
-            mobility.append(tuple(one / play.inertia for one in own))
-            levers = tuple(one - (n == driven) for n, one in enumerate(own))
+            mobility.append(tuple(lever / play.inertia for lever in own))
+            levers = tuple(lever - (n == driven) for n, lever in enumerate(own))
             gap, opening = values[at] - values[driven], rates[at] - rates[driven]
             limited.append(Slip(levers, opening, 0.0, gap))
         return InputTerms(
@@ -103,8 +103,8 @@ class InputMotors:
     @property
     def _driving(self) -> list[tuple[int, Motor]]:
         """Return the motors, each with the number of what it drives, in the order of the laws."""
-        found = zip(self.drives, self.motors, strict=True)
-        return [(at, motor) for at, motor in found if motor]
+        driven_motors = zip(self.drives, self.motors, strict=True)
+        return [(at, motor) for at, motor in driven_motors if motor]
 
     def mount_on(self, mechanism: SeveralDofMechanism) -> SeveralDofMechanism:
         """Return a mechanism with these motors, switched off: with their laws after all others."""
@@ -154,7 +154,7 @@ class InputMotors:
     def efforts(
         self, mechanism: Any, motion: Any, forces: InputVector, brakes: InputVector
     ) -> tuple[list[float], InputVector]:
-        """Return what drives give beside forces, without their gears, and what holds at rest."""
+        """Return what drives give with forces, without their gears, and what holds at rest."""
         efforts: list[float] = [*forces]
         for at, law in self._laws_of(mechanism):
             rate = motion.rate[at]
@@ -166,7 +166,7 @@ class InputMotors:
         return {at: law.torque(motion.rate[at]) for at, law in self._laws_of(mechanism)}
 
     def _loads_of(self, mechanism: SeveralDofMechanism) -> tuple[Any, ...]:
-        """Return the laws that are no motors."""
+        """Return the laws that are not motors."""
         return mechanism.laws[: len(mechanism.laws) - len(self._driving)]
 
     def _laws_of(self, mechanism: SeveralDofMechanism) -> list[tuple[int, Any]]:
@@ -220,12 +220,12 @@ class InputWindings:
         self, begin: Commands, rates: Sequence[float], commands: Commands, seconds: float
     ) -> tuple[float | None, ...]:
         """Return the currents after some time at constant rates; of the others their commands."""
-        found = zip(self.windings, self.drives, begin, commands, strict=True)
+        running = zip(self.windings, self.drives, begin, commands, strict=True)
         return tuple(
             winding.current_after(current or 0.0, rates[at], command, seconds)
             if winding
             else command
-            for winding, at, current, command in found
+            for winding, at, current, command in running
         )
 
     def efforts(
@@ -246,6 +246,8 @@ def motors_of(
 ) -> InputMotors | InputWindings:
     """Return the motors of several inputs, each with the number of what it drives."""
     windings = tuple(None if isinstance(motor, Motor) else motor for motor in built)
-    plain = [one if one is None or isinstance(one, Motor) else one.motor for one in built]
+    plain = [
+        motor if motor is None or isinstance(motor, Motor) else motor.motor for motor in built
+    ]
     motors = InputMotors(tuple(plain), tuple(drives))
     return InputWindings(motors, windings) if any(windings) else motors

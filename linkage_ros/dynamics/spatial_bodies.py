@@ -61,8 +61,8 @@ def _momentum(gyration: Rows | float, turn: Vector) -> Vector:
     """Return K·s; K of a rod that may spin is a number."""
     if isinstance(gyration, float):
         return scale(gyration, turn)
-    one, other, third = gyration
-    return dot(one, turn), dot(other, turn), dot(third, turn)
+    first, second, third = gyration
+    return dot(first, turn), dot(second, turn), dot(third, turn)
 
 
 def _moment(gyration: Rows | float, turn: Vector, change: Vector) -> Vector:
@@ -128,7 +128,7 @@ def _rod_gyration(closure: SpaceClosure, link: str, body: SpatialMass) -> float:
     if (beside := axis.distance(body.center)) > _BESIDE * size:
         raise DefinitionError(
             f'masses.{link}.center',
-            f'it is {beside:.3g} m beside the line through {quote(axis.ends[0])} and '
+            f'it is {beside:.3g} m off the line through {quote(axis.ends[0])} and '
             f'{quote(axis.ends[1])}, about which the rod may spin: nothing says where it is',
             f'write one on the line, or {remedy}',
         )

@@ -46,15 +46,18 @@ def spatial_forms(closure: SpaceClosure, rubbing: Collection[int]) -> JointForms
         _spatial_form(closure, name, joint, number in rubbing)
         for number, (name, joint) in enumerate(linkage.pair_joints.items())
     ]
-    for name, (one, other) in linkage.struts.items():
-        links = [carried.carriers[carried.same[end]][0] for end in (other, one)]
-        ends = [(link, linkage.points[end]) for link, end in zip(links, (other, one), strict=True)]
+    for name, (start_point, end_point) in linkage.struts.items():
+        links = [carried.carriers[carried.same[end]][0] for end in (end_point, start_point)]
+        ends = [
+            (link, linkage.points[end])
+            for link, end in zip(links, (end_point, start_point), strict=True)
+        ]
         along = _strut_direction(closure, ends)
         link, to = links
         joints.append(JointForm(name, link, to, ends[0], (), (), slides=True, axis=along))
     efforts = {joint.name: joint.motion(number) for number, joint in enumerate(joints)}
     for point, first, link in balls_of(linkage, carried):
-        holder = next((one for one in (first, link) if one not in closure.idle), first)
+        holder = next((holding for holding in (first, link) if holding not in closure.idle), first)
         place = holder, scale(closure.scale, carried.places[point])
         name = next(name for name in linkage.points if carried.same[name] == point)
         joints.append(JointForm(name, link, first, place, (0, 1, 2), ()))

@@ -270,10 +270,12 @@ class TwoMasses:
             back = self.restitution * motor.rate if bounces else 0.0
             motor = motor._replace(value=crank.value + side * self.half, rate=0.0 - back)
             return motion._replace(crank=crank, motor=motor, side=0 if back else side)
-        own, other = motor.terms.inertia, crank.terms.inertia
-        common = (own * motor.rate + other * crank.rate) / (own + other)
+        own, crank_inertia = motor.terms.inertia, crank.terms.inertia
+        common = (own * motor.rate + crank_inertia * crank.rate) / (own + crank_inertia)
         slow = side * closing <= _SLOW * (abs(motor.rate) + abs(crank.rate))
-        back = self.restitution * closing / (own + other) if bounces and not slow else 0.0
-        motor = motor._replace(value=crank.value + side * self.half, rate=common - other * back)
+        back = self.restitution * closing / (own + crank_inertia) if bounces and not slow else 0.0
+        motor = motor._replace(
+            value=crank.value + side * self.half, rate=common - crank_inertia * back
+        )
         crank = crank._replace(rate=common + own * back)
         return motion._replace(crank=crank, motor=motor, side=0 if back else side)

@@ -120,16 +120,16 @@ def all_finite(numbers: Sequence[float]) -> bool:
         return bool(_real_symbol(symbols[0], 'finite', *numbers))
 
 
-def where(condition: bool, one: float, other: float) -> float:
+def where(condition: bool, first: float, second: float) -> float:
     """
-    Return ``one`` if a condition holds, otherwise ``other``.
+    Return ``first`` if a condition holds, otherwise ``second``.
 
     Both are evaluated, and both must be numbers. Use it for two equivalent forms; write ``if`` for
     a condition that decides about the linkage.
     """
     if hasattr(condition, 'apply'):
-        return _real_symbol(condition, 'where', condition, one, other)
-    return one if condition else other
+        return _real_symbol(condition, 'where', condition, first, second)
+    return first if condition else second
 
 
 def call(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -160,9 +160,9 @@ def _complex_symbol(symbol: Any, name: str, *arguments: Any) -> complex:
     return result
 
 
-def cross_product(one: complex, other: complex) -> float:
+def cross_product(first: complex, second: complex) -> float:
     """Return the z component of the cross product of two vectors."""
-    return one.real * other.imag - one.imag * other.real
+    return first.real * second.imag - first.imag * second.real
 
 
 def resolve_along(vector: complex, unit: complex) -> tuple[float, float]:

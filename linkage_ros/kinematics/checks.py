@@ -23,9 +23,9 @@ def check_name(key: str, name: str, what: str, names: Iterable[str]) -> None:
     """Refuse a name that is not among others, and suggest one."""
     known = sorted(names)
     if name not in known:
-        other = f'name one of {list_names(known)}' if known else 'this linkage has none'
+        choices = f'name one of {list_names(known)}' if known else 'this linkage has none'
         reason = f'there is no {what} {quote(name)}'
-        raise DefinitionError(key, reason, did_you_mean(name, known, other))
+        raise DefinitionError(key, reason, did_you_mean(name, known, choices))
 
 
 def check_named_once(key: str, names: Iterable[str]) -> None:
@@ -39,7 +39,7 @@ def check_inputs(linkage: Any) -> None:
     """Refuse a linkage without inputs, and an input that is named twice."""
     if not linkage.inputs:
         raise DefinitionError('input', 'no joint is driven', 'name the driven joint')
-    check_named_once('input', (given.joint for given in linkage.inputs))
+    check_named_once('input', (driven.joint for driven in linkage.inputs))
 
 
 def check_traced(linkage: Any, points: Iterable[str]) -> None:
@@ -66,7 +66,7 @@ def check_ratios(
     ``followers`` are the joints that may follow others, ``what`` says which these are, and
     ``leaders`` are those that may be followed.
     """
-    driven = {given.joint for given in linkage.inputs}
+    driven = {driven.joint for driven in linkage.inputs}
     for name, ratio in linkage.ratios.items():
         key = f'ratios.{name}'
         if name in driven:
@@ -101,8 +101,8 @@ def _find_circle(linkage: Any, chain: list[str]) -> list[str]:
 
 def check_all_limits(linkage: Any) -> None:
     """Refuse limits that allow no motion, and a pose beyond those of its inputs."""
-    for given in linkage.inputs:
-        _check_limits('input', given.limits, given.joint, given.unit)
+    for driven in linkage.inputs:
+        _check_limits('input', driven.limits, driven.joint, driven.unit)
     for name, joint in linkage.joints.items():
         _check_limits(f'joints.{name}', joint.limits, name, joint.unit)
         ends = (joint.limits.low, joint.limits.high)
@@ -113,12 +113,12 @@ def check_all_limits(linkage: Any) -> None:
                 'write two finite numbers',
             )
     if linkage.pose:
-        for given, value in zip(linkage.inputs, linkage.pose.inputs, strict=False):
-            if not given.limits.low <= value <= given.limits.high:
+        for driven, value in zip(linkage.inputs, linkage.pose.inputs, strict=False):
+            if not driven.limits.low <= value <= driven.limits.high:
                 raise DefinitionError(
                     'pose.inputs',
-                    f'{value:g} {given.unit} is beyond the limits {given.limits} {given.unit} of '
-                    f'{quote(given.joint)}',
+                    f'{value:g} {driven.unit} is beyond the limits {driven.limits} '
+                    f'{driven.unit} of {quote(driven.joint)}',
                     'start within the limits, or widen them',
                 )
 

@@ -55,19 +55,19 @@ _FILLED = 4096
 Own = TypeVar('Own', bound='Closure')
 
 
-def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
+def _no_motion(what: str, values: tuple[float, ...], status: Status) -> ValueError:
     if not status.has_rates:
         return ValueError(f'{what}: a linkage that is {status.value} has none; check its status')
-    return ValueError(f'{what}: {list(given)} is not finite')
+    return ValueError(f'{what}: {list(values)} is not finite')
 
 
 def _multiply(
-    found: Velocity | Acceleration, factor: float
+    motion: Velocity | Acceleration, factor: float
 ) -> tuple[tuple[float, ...], LinkState]:
     """Return joints and state of a velocity or an acceleration times a factor."""
-    coordinates, pins = found.state
+    coordinates, pins = motion.state
     return (
-        tuple(value * factor for value in found.joints),
+        tuple(value * factor for value in motion.joints),
         LinkState(
             [value * factor for value in coordinates],
             [_multiply_pin(pin, factor) for pin in pins],
@@ -158,11 +158,11 @@ class Closure:
         self.name = name
         self.scale = scale
         """Metres in the unit of length of the steps."""
-        self.input_names = tuple(given.joint for given in linkage.inputs)
+        self.input_names = tuple(driven.joint for driven in linkage.inputs)
         self.joint_names = tuple(linkage.joints)
         self.turning = tuple(isinstance(j, RevoluteJoint) for j in linkage.joints.values())
         """For each published joint: whether it turns (an angle) or slides (a length)."""
-        factors = [1.0 / scale if given.slider else 1.0 for given in linkage.inputs]
+        factors = [1.0 / scale if driven.slider else 1.0 for driven in linkage.inputs]
         self._factors = None if set(factors) == {1.0} else factors
         self._single = factors == [1.0]
         self.bounds = Bounds(linkage)
@@ -221,12 +221,12 @@ class Closure:
         for step in self.steps:
             pose = step.close(state)
             poses.append(pose)
-            found = pose.status
-            if found is not Status.CLOSED:
-                if not found.has_pose:
-                    return Position(found, pose.gap * self.scale, (), state, poses, self)
+            reached = pose.status
+            if reached is not Status.CLOSED:
+                if not reached.has_pose:
+                    return Position(reached, pose.gap * self.scale, (), state, poses, self)
                 if status.has_rates:
-                    status = found
+                    status = reached
         joints: tuple[float, ...] = ()
         for i, j, factor, constant in self._terms:
             joints += (factor * (x[i] - x[j]) + constant,)
@@ -266,10 +266,10 @@ class Closure:
         if v is None or not position.status.has_rates:
             return self._huge_velocity(position, self._as_doubles('rates', rates))
         velocities = LinkState(v, [])
-        found = []
+        step_rates = []
         for step, pose in zip(self.steps, position.poses, strict=True):
-            found.append(step.rates(pose, position.state, velocities))
-        return Velocity(self._joint_rates(v), velocities, found, self)
+            step_rates.append(step.rates(pose, position.state, velocities))
+        return Velocity(self._joint_rates(v), velocities, step_rates, self)
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -417,8 +417,8 @@ class Closure:
 
     def rate_term(self, number: int) -> tuple[int, int, float]:
         """Return i, j, factor of a published joint: its rate is factor·(v[i] − v[j])."""
-        one, other, factor, _ = self._terms[number]
-        return one, other, factor
+        first, second, factor, _ = self._terms[number]
+        return first, second, factor
 
     def jacobian(self, position: Position) -> Array:
         """
@@ -467,7 +467,7 @@ class Closure:
         Raises
         ------
         DefinitionError
-            If a name is no joint and no input, or ``to`` has more or fewer than there are inputs.
+            If a name is of no joint or input, or ``to`` has more or fewer than there are inputs.
         TypeError
             If the position is one of another linkage.
 
@@ -485,8 +485,8 @@ class Closure:
         """Return the velocity at rates of which one is huge: infinite where it overflows."""
         if not (position.status.has_rates and all_finite(rates)):
             raise _no_motion('rates', rates, position.status)
-        found = self.velocity(position, *(rate * SHRINK for rate in rates))
-        return Velocity(*_multiply(found, 1.0 / SHRINK), found, self)
+        velocity = self.velocity(position, *(rate * SHRINK for rate in rates))
+        return Velocity(*_multiply(velocity, 1.0 / SHRINK), velocity, self)
 
     def _huge_acceleration(
         self, position: Position, velocity: Velocity, accelerations: tuple[float, ...]
@@ -498,8 +498,8 @@ class Closure:
             rates = self.inputs_of(velocity.state)
             scaled = self.velocity(position, *(rate * SHRINK for rate in rates))
         changes = (change * SHRINK * SHRINK for change in accelerations)
-        found = self.acceleration(position, scaled, *changes)
-        once = Acceleration(*_multiply(found, 1.0 / SHRINK), self)
+        acceleration = self.acceleration(position, scaled, *changes)
+        once = Acceleration(*_multiply(acceleration, 1.0 / SHRINK), self)
         return Acceleration(*_multiply(once, 1.0 / SHRINK), self)
 
     def compile_linkage(
@@ -509,7 +509,7 @@ class Closure:
         Return the linkage compiled; for the same numbers it is compiled once.
 
         ``derivatives``: 0 for positions, 1 for velocities too, 2 for accelerations too. ``wanted``
-        selects the numbers, by the motion and ``given_count`` numbers beside it; without it they
+        selects the numbers, by the motion and ``given_count`` further numbers; without it they
         are all published joints.
         """
         from linkage_ros.kinematics.compiling import (
@@ -551,7 +551,7 @@ class Closure:
             (N, inputs). A state with a value that is not finite is indeterminate.
         rates, accelerations
             For each driven joint a number or an array (N,); with one driven joint, without a list.
-            Beside one array of inputs also one array (N, inputs).
+            With one array of inputs also one array (N, inputs).
             Without ``rates`` the rate of a single driven joint is 1; several driven joints need
             them. Without ``accelerations`` these are 0.
         derivatives
@@ -689,7 +689,7 @@ class Closure:
         factors = self._factors or [1.0] * len(inputs)
         for grid in self.grids:
             grid.look_ahead(
-                *([each[k] * factors[k] for k in grid.numbers] for each in (inputs, rates))
+                *([values[k] * factors[k] for k in grid.numbers] for values in (inputs, rates))
             )
 
     def slide_reach(self, _number: int) -> tuple[float, float]:
@@ -766,12 +766,12 @@ class Closure:
         factors = self._factors
         return values if factors is None else map(mul, values, factors)
 
-    def _check_own(self, what: str, found: Position | Velocity) -> None:
+    def _check_own(self, what: str, result: Position | Velocity) -> None:
         """Refuse a result of another linkage: the steps would read its numbers."""
-        closure = getattr(found, 'closure', None)
+        closure = getattr(result, 'closure', None)
         linkage = getattr(closure, 'linkage', None)
         if linkage is not self.linkage and linkage != self.linkage:
-            message = f'{what}: {quote(found)} is not from {self!r}; give one that it returned'
+            message = f'{what}: {quote(result)} is not from {self!r}; give one that it returned'
             raise TypeError(message)
 
     def _joint_rates(self, values: list[float]) -> tuple[float, ...]:

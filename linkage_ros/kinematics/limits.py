@@ -75,7 +75,7 @@ class Bounds:
 
     def __init__(self, linkage: Any) -> None:
         limits = {name: of for name, of in linkage.limits.items() if of.is_bounded}
-        driven = [given.joint for given in linkage.inputs]
+        driven = [driven.joint for driven in linkage.inputs]
         self.inputs = tuple(
             _make_bound(name, index, limits[name])
             for index, name in enumerate(driven)
@@ -105,18 +105,18 @@ class Bounds:
         """Return which of many states are beyond; inputs (N,) each, and joints (joints, N)."""
         import numpy as np  # local import: the batch alone needs it
 
-        found = np.zeros(joints.shape[1], bool)
+        beyond = np.zeros(joints.shape[1], bool)
         for bound in self.inputs:
             value = inputs[bound.number]
-            found |= ~((bound.low <= value) & (value <= bound.high))
+            beyond |= ~((bound.low <= value) & (value <= bound.high))
         for bound in self.joints:
             value = joints[bound.number]
             within = (bound.low <= value) & (value <= bound.high)
             if bound.middle is not None:
                 value = value - tau * np.rint((value - bound.middle) / tau)
                 within |= (bound.low <= value) & (value <= bound.high)
-            found |= ~within
-        return found
+            beyond |= ~within
+        return beyond
 
 
 def limit_status(position: Callable[..., Position], bounds: Bounds) -> Callable[..., Position]:
@@ -125,10 +125,10 @@ def limit_status(position: Callable[..., Position], bounds: Bounds) -> Callable[
 
     @wraps(position)
     def close_limited(*inputs: float) -> Position:
-        found = position(*inputs)
-        if found.status in _UNDISTURBED and exceeded(found.inputs, found.joints) is not None:
-            return replace(found, status=Status.LIMITED)
-        return found
+        closed = position(*inputs)
+        if closed.status in _UNDISTURBED and exceeded(closed.inputs, closed.joints) is not None:
+            return replace(closed, status=Status.LIMITED)
+        return closed
 
     return close_limited
 
@@ -156,7 +156,7 @@ def zero_length(linkage: Linkage, structure: Structure) -> float | None:
         return None
     slider = linkage.sliders[name]
     tube, rod = slider.along, structure.blocks[name]
-    turned = {link for given in linkage.inputs for link in (given.parent, given.child)}
+    turned = {link for driven in linkage.inputs for link in (driven.parent, driven.child)}
     if GROUND in (tube, rod) or not turned.isdisjoint((tube, rod)):
         return None
     places = []
@@ -190,10 +190,10 @@ def without_mirrored(
     if zero is None:
         return ranges
     positive = tuple(
-        one._replace(lowest=max(one.lowest, zero)) for one in ranges if one.highest > zero
+        part._replace(lowest=max(part.lowest, zero)) for part in ranges if part.highest > zero
     )
     negative = tuple(
-        one._replace(highest=min(one.highest, zero)) for one in ranges if one.lowest < zero
+        part._replace(highest=min(part.highest, zero)) for part in ranges if part.lowest < zero
     )
     pose, limits = linkage.pose, linkage.inputs[0].limits
     if limits.high <= zero or (pose and pose.inputs[0] < zero):

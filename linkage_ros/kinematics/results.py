@@ -174,7 +174,7 @@ class _JointValues(Mapping[str, float]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Also for the pickle protocols that know no slots.
-        names = [each.name for each in fields(self)]  # type: ignore[arg-type]
+        names = [field.name for field in fields(self)]  # type: ignore[arg-type]
         return type(self), tuple(getattr(self, name) for name in names)
 
     def __iter__(self) -> Iterator[str]:

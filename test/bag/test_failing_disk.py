@@ -226,15 +226,23 @@ def test_short_writes_are_completed(tmp_path, topics, messages, readers, monkeyp
     readers.agree(tmp_path / 'run', topics, messages[:100])
 
 
-def test_disk_that_accepts_no_data_ends_a_recording(tmp_path, topics, messages, monkeypatch):
+@pytest.mark.parametrize('healthy', [0, 5, 19, 20, None])
+def test_disk_that_stops_writing_leaves_a_readable_bag(
+    tmp_path, topics, messages, monkeypatch, healthy
+):
     writer = BagWriter(tmp_path / 'run', topics)
     write(writer, messages[:100])
     writer.flush()
-    monkeypatch.setattr('os.pwrite', lambda descriptor, view, offset: 0)
-    with pytest.raises(RecordingError, match=r'ended early: the disk accepts no data; .* check'):
-        write(writer, messages[100:2000])
-    assert sum(writer.close().counts) == 100
-    assert data_of(tmp_path / 'run', allow_truncated=True) == data(messages[:100])
+    if healthy is None:
+        reason, pwrite = 'the disk accepts no data', lambda descriptor, view, offset: 0
+    else:
+        reason, pwrite = 'Input/output error', failing(os.pwrite, range(healthy, 10**9))
+    monkeypatch.setattr('os.pwrite', pwrite)
+    with pytest.raises(RecordingError, match=rf'ended early: {reason}; .* check'):
+        write(writer, messages[100:])
+    kept = sum(writer.close().counts)
+    assert kept > 100 if healthy else kept == 100
+    assert data_of(tmp_path / 'run', allow_truncated=True) == data(messages[:kept])
 
 
 class _Deaf:

@@ -13,7 +13,6 @@ Real faults where the machine allows: a tmpfs of 2 MiB, a limit on the size of a
 """
 
 from contextlib import suppress
-import errno
 import json
 import os
 from pathlib import Path
@@ -220,29 +219,6 @@ def test_disk_below_min_free_bytes_gets_no_bag(small_disk, topics):
     ):
         BagWriter(small_disk / 'run', topics, storage=Storage(min_free_bytes=5_000_000))
     assert list(small_disk.iterdir()) == []
-
-
-@pytest.mark.parametrize('healthy_writes', [6, 20, 21])
-def test_failing_disk_leaves_the_written_part_readable(
-    tmp_path, topics, messages, monkeypatch, healthy_writes
-):
-    writer = BagWriter(tmp_path / 'run', topics, ATTACHMENTS)
-    healthy = iter(range(healthy_writes))
-    pwrite = os.pwrite
-
-    def dying(*arguments):
-        if next(healthy, None) is None:
-            raise OSError(errno.EIO, 'Input/output error')
-        return pwrite(*arguments)
-
-    monkeypatch.setattr('os.pwrite', dying)
-    _, error = _write_until_it_fails(writer, messages)
-    assert 'ended early: Input/output error' in str(error)
-    kept = sum(writer.close().counts)
-    bag = read_bag(tmp_path / 'run', allow_truncated=True)
-    assert bag.truncated
-    assert [message.data for message in bag.messages()] == [m.data for m in messages[:kept]]
-    assert kept > 200
 
 
 KILLED = """

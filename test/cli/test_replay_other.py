@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 import json
-from math import acos, atan2, cos, hypot, remainder, sin, sqrt, tau
+from math import sin, sqrt
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -43,6 +43,7 @@ from .recorded import (
     told as messages_of,
     topic,
 )
+from ..support.four_bar import four_bar_angles
 
 TICKS = 300
 PLAIN = 'effects: {velocity: {}}\n'
@@ -57,13 +58,6 @@ def angle(number: int) -> float:
 def crank(number: int) -> Mapping[str, tuple[float, float]]:
     """Turn the crank at 20 rad/s; samples come every other tick."""
     return {} if number % 2 else {'crank_joint': (angle(number), 20.0)}
-
-
-def rocker(a: float, b: float, c: float, d: float, theta: float) -> float:
-    """Return the rocker's angle, B on the left of A→O4: two circles that meet."""
-    x, y = d - a * cos(theta), -a * sin(theta)
-    s = hypot(x, y)
-    return remainder(atan2(-y, -x) - acos((s * s + c * c - b * b) / (2.0 * s * c)), tau)
 
 
 def recorded(
@@ -120,7 +114,7 @@ def test_longer_coupler_changes_the_rocker_by_the_closed_form(tmp_path, capsys):
     scene = other(tmp_path, PLAIN, longer)
     account = told(capsys, recorded(tmp_path), '--scene', scene)
     apart = [
-        rocker(0.04, 0.125, 0.08, 0.1, angle(k)) - rocker(0.04, 0.12, 0.08, 0.1, angle(k))
+        four_bar_angles(angle(k), (0.04, 0.125, 0.08, 0.1))[1] - four_bar_angles(angle(k))[1]
         for k in range(TICKS)
     ]
     found = row(account, 'rocker_joint')
@@ -296,7 +290,7 @@ def test_foreign_bag_is_replayed_with_a_scene(tmp_path, capsys, topics, typed, u
         if name == again['topics'][0]['name']
     }
     for number in (0, 100, 299):
-        expected = rocker(0.04, 0.12, 0.08, 0.1, angle(number))
+        expected = four_bar_angles(angle(number))[1]
         assert at[BEGIN + (5 * number + 1) * MS] == pytest.approx(expected, abs=1e-12)
 
 

@@ -11,13 +11,14 @@
 from __future__ import annotations
 
 from cmath import phase, rect
-from math import acos, degrees, log10, radians, remainder
+from math import degrees, log10, radians, remainder
 from pathlib import Path
 import re
 
 import pytest
 
 from .conftest import on_terminal, Run
+from ..support.four_bar import meeting_point
 
 SOURCE_003 = ['--pair', '25', '30', '--pair', '35', '40', '--pair', '50', '60', '--ground', '1.0']
 """Freudenstein's three positions as a textbook has them; it prints a 5.598, b 0.176, c 4.88."""
@@ -35,10 +36,7 @@ MOVING = ['--moving-pivot', '0', '0', '--moving-pivot', '1', '0']
 def rocker_angle(a: complex, b: float, c: complex, d: float, crank: float) -> float:
     """Return the rocker's angle in degrees, B on the left of A→O4: two circles that meet."""
     pin = a * rect(1.0, radians(crank))
-    diagonal = d - pin
-    s = abs(diagonal)
-    at_pivot = acos((s * s + abs(c) ** 2 - b * b) / (2.0 * s * abs(c)))
-    return remainder(degrees(phase(-diagonal) - at_pivot - phase(c)), 360.0)
+    return remainder(degrees(phase(meeting_point(pin, d, b, abs(c)) - d) - phase(c)), 360.0)
 
 
 def typed_pairs(a: complex, b: float, c: complex, d: float, cranks: list[float]) -> list[str]:

@@ -17,9 +17,9 @@ and the time is the integral of dq/q̇, by Gauss's rule between the places at wh
 and rates are those of textbooks (R. L. Norton, Design of Machinery, ch. 4 and 6).
 """
 
-from cmath import phase, rect
+from cmath import rect
 from itertools import pairwise
-from math import acos, log2, pi, sin, sqrt
+from math import log2, pi, sin, sqrt
 
 from linkage_ros.dynamics import (
     Friction,
@@ -36,9 +36,10 @@ import pytest
 
 from .loaded import closed, four_bar, scotch_yoke, STATES
 from .test_integrators import ORDER, STEP
+from ..support.four_bar import four_bar_angles, GALLERY
 
 GRAVITY = 9.81
-LENGTHS = 0.04, 0.12, 0.08, 0.1
+LENGTHS = GALLERY
 MASSES = {
     'crank': Mass(0.3, (0.01, 0.004), 2e-4),
     'coupler': Mass(0.2, (0.05, 0.02), 3e-4),
@@ -56,11 +57,7 @@ class ByHand:
         self.coulomb = coulomb
 
     def angles(self, q):
-        a, b, c, d = LENGTHS
-        diagonal = d - rect(a, q)
-        s = abs(diagonal)
-        coupler = phase(diagonal) + acos((b * b + s * s - c * c) / (2 * b * s))
-        return q, coupler, phase(rect(a, q) + rect(b, coupler) - d)
+        return q, *four_bar_angles(q)
 
     def rates(self, q):
         """Return the rates of the links at a crank rate of 1."""

@@ -17,11 +17,12 @@ from linkage_ros.tick import Pipeline
 import numpy as np
 import pytest
 
+from ..support.four_bar import GALLERY, meeting_point
 from ..support.messages import joint_state
 from ..support.scenes import FOUR_BAR, four_bar_text, pipeline_of, scene_of
 
 SECOND = 10**9
-A, B, C, D = 0.04, 0.12, 0.08, 0.1
+A, B, C, D = GALLERY
 MASSLESS = (
     'masses: {'
     + ', '.join(
@@ -33,12 +34,9 @@ MASSLESS = (
 
 
 def four_bar_at(angle):
-    """Return the pins A and B of the open four-bar, by the cosine law."""
+    """Return the pins A and B of the open four-bar."""
     crank = rect(A, angle)
-    to_crank = crank - D
-    reach = abs(to_crank)
-    between = np.arccos((reach**2 + C**2 - B**2) / (2 * reach * C))
-    return crank, D + rect(C, np.angle(to_crank) - between)
+    return crank, meeting_point(crank, D, B, C)
 
 
 def statics(angle, torque, force, at):

@@ -14,8 +14,8 @@ scipy's integrator on an equation of motion written here; and on many linkages t
 drive is the work of force and torque over the ways of point and link.
 """
 
-from cmath import exp, phase
-from math import acos, inf, nan
+from cmath import exp
+from math import inf, nan
 
 from linkage_ros.description import load_scene
 from linkage_ros.dynamics import AppliedLoads, Loads, Mechanics, Reactions, WrenchLoad
@@ -27,6 +27,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from .loaded import closed, slope, STATES
+from ..support.four_bar import four_bar_angles, GALLERY
 from ..support.messages import wrench_stamped
 from ..support.scenes import LINKAGES, PENDULUM, pipeline_of
 
@@ -99,7 +100,7 @@ def test_wrench_without_a_point_acts_at_link_origin():
 
 # The shipped four-bar: A, B, C, D are the lengths of crank, coupler, rocker and ground; of each
 # link mass, centre and inertia; and P of the coupler.
-A, B, C, D, P = 0.040, 0.120, 0.080, 0.100, 0.060 + 0.030j
+(A, B, C, D), P = GALLERY, 0.060 + 0.030j
 BODIES = (
     (0.025, 0.020, 4.2e-6),
     (0.100, 0.060 + 0.005j, 1.05e-4),
@@ -109,10 +110,7 @@ BODIES = (
 
 def four_bar(theta):
     """Return the angles of the links, from the intersection of two circles, and their origins."""
-    pin = A * exp(1j * theta)
-    lean = acos((B**2 + abs(D - pin) ** 2 - C**2) / (2 * B * abs(D - pin)))
-    phi = phase(D - pin) + lean
-    return (theta, phi, phase(pin + B * exp(1j * phi) - D)), (0j, pin, D + 0j)
+    return (theta, *four_bar_angles(theta)), (0j, A * exp(1j * theta), D + 0j)
 
 
 def place(theta, link, point):

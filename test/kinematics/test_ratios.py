@@ -37,6 +37,8 @@ from mpmath import mp, mpf
 import numpy as np
 import pytest
 
+from ..support.four_bar import meeting_point
+
 STATES = int(environ.get('LINKAGE_STATES', '0')) or 120
 """How many random linkages of each kind are compared."""
 
@@ -109,15 +111,6 @@ def two_four_bars(ratio: Ratio, **more: Any) -> Linkage:
     )
 
 
-def meeting(one: Any, other: Any, b: Any, c: Any, side: int) -> Any:
-    """Return where circles about two points meet, on a side of the line between; None: nowhere."""
-    apart = other - one
-    s = abs(apart)
-    along = (s * s + b * b - c * c) / (2 * s)
-    square = b * b - along * along
-    return None if square < 0 else one + apart / s * mp.mpc(along, side * mp.sqrt(square))
-
-
 def turned(angle: Any) -> Any:
     """Return an angle within half a turn of 0."""
     return angle - 2 * mp.pi * mp.nint(angle / (2 * mp.pi))
@@ -145,7 +138,7 @@ def five_bar_angles(lengths: Any, ratio: Ratio, side: int, crank: Any) -> Any:
     ground, a, b, c, d = map(mpf, lengths)
     geared = mpf(ratio.ratio) * crank + mpf(ratio.offset)
     pin_a, pin_c = a * mp.expj(crank), ground + d * mp.expj(geared)
-    pin_b = meeting(pin_c, pin_a, c, b, side)
+    pin_b = meeting_point(pin_c, pin_a, c, b, side)
     return None if pin_b is None else (geared, mp.arg(pin_b - pin_a), mp.arg(pin_b - pin_c))
 
 
@@ -225,7 +218,7 @@ def posed_five_bar(
     """Return a five-bar whose coupler turns against the crank as link 5 does, by a ratio."""
     ground, a, b, c, d = lengths
     pin_a, pin_c = rect(a, theta), ground + rect(d, geared)
-    met = meeting(pin_c, pin_a, c, b, 1)
+    met = meeting_point(pin_c, pin_a, c, b, 1)
     if met is None:
         return None
     pin_b = complex(met)
@@ -345,7 +338,7 @@ def test_implicit_ratio_turns_its_link_by_whole_input_turns(ratio: float) -> Non
             for turns in range(-6, 7):
                 theta = value + tau * turns
                 place = mpf(links['crank']['A'][0]) * mp.expj(theta)
-                met = meeting(
+                met = meeting_point(
                     place, mpf(links['ground']['D'][0]), links['coupler']['B'][0],
                     links['rocker']['B'][0], 1,
                 )  # fmt: skip
@@ -425,7 +418,7 @@ def test_geared_trains_follow_the_crank_over_whole_turns() -> None:
         for turns in (-70, -1, 0, 2, 200):
             theta = rng.uniform(-pi, pi) + tau * turns
             place = mpf('0.5') * mp.expj(theta)
-            closes = meeting(place, mpf(1), mpf('0.7'), mpf('0.6'), 1) is not None
+            closes = meeting_point(place, mpf(1), mpf('0.7'), mpf('0.6'), 1) is not None
             position = closure.position(theta)
             assert position.status.has_pose == closes
             opened += not closes
@@ -450,11 +443,11 @@ def test_ratio_follows_a_rocker_of_another_four_bar(ratio: float) -> None:
         position = closure.position(0.31 * k)
         with mp.workdps(30):
             pin_a = mpf('0.03') * mp.expj(mpf(0.31 * k))
-            pin_b = meeting(pin_a, mpf('0.08'), mpf('0.08'), mpf('0.06'), 1)
+            pin_b = meeting_point(pin_a, mpf('0.08'), mpf('0.08'), mpf('0.06'), 1)
             rocker = mp.arg(pin_b - mpf('0.08'))
             gear = mpf(ratio) * rocker + mpf('0.3')
             pin_e = mpf('0.2') + mpf('0.03') * mp.expj(gear)
-            pin_f = meeting(pin_e, mpf('0.3'), mpf('0.09'), mpf('0.07'), 1)
+            pin_f = meeting_point(pin_e, mpf('0.3'), mpf('0.09'), mpf('0.07'), 1)
             right = rocker, gear, mp.arg(pin_f - mpf('0.3'))
             assert same_angles(position.joints, right)
 

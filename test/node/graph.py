@@ -32,6 +32,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 
 PATIENCE = 20.0
 """How long anything is waited for, in [s]: on a loaded machine too, it comes much sooner."""
@@ -121,6 +122,17 @@ class Graph:
             return future.result()
         finally:
             self.node.destroy_client(client)
+
+    def trigger(self, service: str) -> tuple[bool, str]:
+        """Call one of the node's services; return its success and message."""
+        answer = self.call(Trigger, f'/linkage_node/{service}')
+        return answer.success, answer.message
+
+    def change_state(self, transition: int) -> bool:
+        """Ask the node for a transition; return whether it succeeded."""
+        request = ChangeState.Request(transition=Transition(id=transition))
+        success: bool = self.call(ChangeState, '/linkage_node/change_state', request).success
+        return success
 
     def status(self, task: str) -> DiagnosticStatus | None:
         """Return the newest status of a task: tick, crank, loop closure or recording."""
@@ -212,9 +224,7 @@ class NodeProcess:
     def _change_state(self, *transitions: int) -> None:
         assert self.graph is not None
         for transition in transitions:
-            request = ChangeState.Request(transition=Transition(id=transition))
-            answer = self.graph.call(ChangeState, '/linkage_node/change_state', request)
-            assert answer.success, self.log
+            assert self.graph.change_state(transition), self.log
 
     def end(self, number: int = signal.SIGINT) -> int:
         """Send a signal, and return the exit code; one that tests share is only cleaned up."""

@@ -9,22 +9,19 @@
 """The shipped linkages by complex numbers, independent of the package."""
 
 from cmath import exp, phase
-from math import acos, remainder, sqrt, tau
+from math import acos, remainder, tau
 
 import pytest
 
-A, B, C, D = 0.040, 0.120, 0.080, 0.100
-"""Lengths of config/linkages/four_bar.yaml, in [m]."""
+from ..support.four_bar import four_bar_angles, GALLERY
+
+A, B, C, D = GALLERY
 
 
 def four_bar(theta: float) -> tuple[float, float]:
-    """Return coupler_joint and rocker_joint: B is where two circles meet, left of A→O4."""
-    a = A * exp(1j * theta)
-    diagonal = D - a
-    s = abs(diagonal)
-    along = (s * s + B * B - C * C) / (2 * s)
-    b = a + diagonal / s * (along + 1j * sqrt(B * B - along * along))
-    return phase(b - a) - theta, phase(b - D)
+    """Return coupler_joint and rocker_joint."""
+    coupler, rocker = four_bar_angles(theta)
+    return coupler - theta, rocker
 
 
 def inverted_slider_crank(theta: float) -> tuple[float, float]:

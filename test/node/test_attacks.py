@@ -10,13 +10,11 @@
 
 from campaigns.reliability.attacks import attack_node
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 from linkage_ros.messages import JointStateWriter, SampleRouter
 import pytest
 from rcl_interfaces.msg import Log, Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from .graph import crank, wait_for
 from ..support.sampling import sample_count
@@ -41,7 +39,7 @@ def test_parameter_of_unknown_type_does_not_end_the_node(graph, write_scene, sta
     request = SetParameters.Request(parameters=[Parameter(value=ParameterValue(type=77))])
     futures = [client.call_async(request) for _ in range(100)]
     node.wait_for_log('a call failed: ValueError')
-    assert graph.call(Trigger, '/linkage_node/reset').success
+    assert graph.trigger('reset')[0]
     assert not any(future.done() for future in futures), 'rclpy has no answer to these'
     heard = graph.listen(JointState, '/joint_states')
     publisher = graph.publisher(JointState, '/crank_states')
@@ -77,10 +75,8 @@ def peer(graph):
         answer = graph.call(SetParameters, '/linkage_node/set_parameters', request)
         assert all(result.successful for result in answer.results)
         log.clear()
-        request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_CONFIGURE))
-        if graph.call(ChangeState, '/linkage_node/change_state', request).success:
-            request.transition.id = Transition.TRANSITION_CLEANUP
-            assert graph.call(ChangeState, '/linkage_node/change_state', request).success
+        if graph.change_state(Transition.TRANSITION_CONFIGURE):
+            assert graph.change_state(Transition.TRANSITION_CLEANUP)
             return ''
         return wait_for(lambda: log and log[-1].msg, 'the reason')
 

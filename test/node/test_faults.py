@@ -16,7 +16,6 @@ import json
 import time
 
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 from linkage_ros.bag import read_bag
 from linkage_ros.replay import recorded_scene, replay_ticks
 import pytest
@@ -149,9 +148,7 @@ def test_faults_by_service_are_recorded_and_replayed(graph, folder, drill):
 
 def test_inactive_node_refuses_to_inject_a_fault(graph, write_scene, start):
     node = start(write_scene('still', SCENE), '-p', 'autostart:=false', ready='')
-    change = ChangeState.Request()
-    change.transition.id = Transition.TRANSITION_CONFIGURE
-    assert graph.call(ChangeState, '/linkage_node/change_state', change).success
+    assert graph.change_state(Transition.TRANSITION_CONFIGURE)
     answer = graph.call(SetBool, '/linkage_node/inject/frozen', SetBool.Request(data=True))
     assert not answer.success
     assert answer.message == 'not active: nothing to inject into'

@@ -11,13 +11,12 @@
 import time
 
 from lifecycle_msgs.msg import State, Transition
-from lifecycle_msgs.srv import ChangeState, GetState
+from lifecycle_msgs.srv import GetState
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParameters
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from .graph import crank, wait_for
 
@@ -26,31 +25,8 @@ BY_HAND = '-p', 'autostart:=false'
 
 
 @pytest.fixture
-def change(graph):
-    """Return a function that asks for a transition and tells whether it succeeded."""
-
-    def change(transition):
-        request = ChangeState.Request()
-        request.transition.id = transition
-        return graph.call(ChangeState, f'{NODE}/change_state', request).success
-
-    return change
-
-
-@pytest.fixture
 def state(graph):
     return lambda: graph.call(GetState, f'{NODE}/get_state').current_state.id
-
-
-@pytest.fixture
-def trigger(graph):
-    """Return a function that calls one of the node's services, and gives success and message."""
-
-    def trigger(service):
-        answer = graph.call(Trigger, f'{NODE}/{service}')
-        return answer.success, answer.message
-
-    return trigger
 
 
 @pytest.fixture
@@ -83,26 +59,26 @@ def counts(bag):
 
 
 def test_managed_node_records_one_bag_per_activation(
-    write_scene, start, folder, change, state, turn
+    graph, write_scene, start, folder, state, turn
 ):
     runs = folder / 'two_bags'
     scene = write_scene('managed', f'rate: 100\nrecord: {{directory: {runs}}}')
     node = start(scene, *BY_HAND, ready='')
     assert state() == State.PRIMARY_STATE_UNCONFIGURED
     assert not turn(0.2)
-    assert change(Transition.TRANSITION_CONFIGURE)
+    assert graph.change_state(Transition.TRANSITION_CONFIGURE)
     assert state() == State.PRIMARY_STATE_INACTIVE
     assert not turn(0.2)
     assert not runs.exists()
     for _ in range(2):
-        assert change(Transition.TRANSITION_ACTIVATE)
+        assert graph.change_state(Transition.TRANSITION_ACTIVATE)
         assert state() == State.PRIMARY_STATE_ACTIVE
         assert turn()
-        assert change(Transition.TRANSITION_DEACTIVATE)
+        assert graph.change_state(Transition.TRANSITION_DEACTIVATE)
         time.sleep(0.1)
         assert not turn(0.2)
-    assert change(Transition.TRANSITION_CLEANUP)
-    assert change(Transition.TRANSITION_CONFIGURE), 'it may be set up again'
+    assert graph.change_state(Transition.TRANSITION_CLEANUP)
+    assert graph.change_state(Transition.TRANSITION_CONFIGURE), 'it may be set up again'
     assert node.end() == 0
     bags = sorted(runs.iterdir())
     assert len(bags) == 2
@@ -113,9 +89,9 @@ def test_managed_node_records_one_bag_per_activation(
         assert min(found.values()) > 0
 
 
-def test_bad_scene_fails_the_configure_transition(write_scene, start, change, state):
+def test_bad_scene_fails_the_configure_transition(graph, write_scene, start, state):
     node = start(write_scene('bad', 'rtae: 100'), *BY_HAND, ready='')
-    assert not change(Transition.TRANSITION_CONFIGURE)
+    assert not graph.change_state(Transition.TRANSITION_CONFIGURE)
     assert state() == State.PRIMARY_STATE_UNCONFIGURED
     (line,) = [line for line in node.log.splitlines() if 'bad.yaml' in line]
     assert "bad.yaml:2: rtae: unknown key; did you mean 'rate'?" in line
@@ -123,10 +99,10 @@ def test_bad_scene_fails_the_configure_transition(write_scene, start, change, st
     assert 'Traceback' not in node.log
 
 
-def test_unconfigured_node_takes_another_scene(graph, write_scene, start, change, turn):
+def test_unconfigured_node_takes_another_scene(graph, write_scene, start, turn):
     """Whichever scene it is set up with is the one that it runs."""
     node = start(write_scene('absent', 'rtae: 100'), *BY_HAND, ready='')
-    assert not change(Transition.TRANSITION_CONFIGURE)
+    assert not graph.change_state(Transition.TRANSITION_CONFIGURE)
 
     def give(scene):
         changed = parameter('scene', string_value=str(scene))
@@ -137,13 +113,13 @@ def test_unconfigured_node_takes_another_scene(graph, write_scene, start, change
     names = {}
     for linkage in ('four_bar', 'inverted_slider_crank'):
         assert give(write_scene(f'now_{linkage}', 'rate: 100', linkage)) == ''
-        assert change(Transition.TRANSITION_CONFIGURE)
+        assert graph.change_state(Transition.TRANSITION_CONFIGURE)
         assert 'cannot change while the node is configured' in give('other.yaml')
-        assert change(Transition.TRANSITION_ACTIVATE)
+        assert graph.change_state(Transition.TRANSITION_ACTIVATE)
         assert 'cannot change while the node is configured' in give('other.yaml')
         names[linkage] = [*turn()[-1].name]
-        assert change(Transition.TRANSITION_DEACTIVATE)
-        assert change(Transition.TRANSITION_CLEANUP)
+        assert graph.change_state(Transition.TRANSITION_DEACTIVATE)
+        assert graph.change_state(Transition.TRANSITION_CLEANUP)
     assert names == {
         'four_bar': ['coupler_joint', 'rocker_joint'],
         'inverted_slider_crank': ['rod_joint', 'rod_slide'],
@@ -151,35 +127,33 @@ def test_unconfigured_node_takes_another_scene(graph, write_scene, start, change
     assert node.end() == 0
 
 
-def test_impossible_transitions_and_services_are_refused(
-    write_scene, start, change, state, trigger
-):
+def test_impossible_transitions_and_services_are_refused(graph, write_scene, start, state):
     node = start(write_scene('refused', 'rate: 100'), *BY_HAND, ready='')
     for transition in ('ACTIVATE', 'DEACTIVATE', 'CLEANUP', 'ACTIVE_SHUTDOWN'):
-        assert not change(getattr(Transition, f'TRANSITION_{transition}'))
+        assert not graph.change_state(getattr(Transition, f'TRANSITION_{transition}'))
         assert state() == State.PRIMARY_STATE_UNCONFIGURED
-    assert change(Transition.TRANSITION_CONFIGURE)
-    assert not change(Transition.TRANSITION_CONFIGURE)
+    assert graph.change_state(Transition.TRANSITION_CONFIGURE)
+    assert not graph.change_state(Transition.TRANSITION_CONFIGURE)
     for service in ('reset', 'start_recording', 'stop_recording'):
-        success, message = trigger(service)
+        success, message = graph.trigger(service)
         assert not success
         assert 'not ' in message
     assert node.end() == 0
     assert 'Traceback' not in node.log
 
 
-def test_shutdown_service_closes_the_bag(write_scene, start, folder, change, state, turn):
+def test_shutdown_service_closes_the_bag(graph, write_scene, start, folder, state, turn):
     runs = folder / 'shut'
     node = start(write_scene('shut', f'rate: 100\nrecord: {{directory: {runs}}}'))
     turn()
-    assert change(Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    assert graph.change_state(Transition.TRANSITION_ACTIVE_SHUTDOWN)
     assert state() == State.PRIMARY_STATE_FINALIZED
     (bag,) = runs.iterdir()
     assert counts(bag)['/joint_states'] > 0
     assert node.end() == 0
 
 
-def test_reset_service_forgets_turns_and_stamps(graph, write_scene, start, trigger, turn):
+def test_reset_service_forgets_turns_and_stamps(graph, write_scene, start, turn):
     start(write_scene('reset', 'rate: 100\ndrive: {topic: {max_age: 60, carry_forward: false}}'))
     # Three turns, a third at a time: the coupler unwinds against the crank.
     heard = turn(angle=0.0)
@@ -187,7 +161,7 @@ def test_reset_service_forgets_turns_and_stamps(graph, write_scene, start, trigg
     for third in range(1, 10):
         heard = turn(angle=third * 2.0943951)
     assert heard[-1].position[0] - first == pytest.approx(-18.85, abs=0.01)
-    success, message = trigger('reset')
+    success, message = graph.trigger('reset')
     assert success, message
     time.sleep(0.2)
     heard.clear()
@@ -198,23 +172,23 @@ def test_reset_service_forgets_turns_and_stamps(graph, write_scene, start, trigg
     wait_for(lambda: graph.value('tick', 'Resets') == '1', 'the count of resets')
 
 
-def test_services_start_and_stop_a_recording(write_scene, start, folder, trigger, turn):
+def test_services_start_and_stop_a_recording(graph, write_scene, start, folder, turn):
     runs = folder / 'asked'
     # Who asks runs elsewhere: what is relative to the node's own folder is answered as absolute.
     node = start(write_scene('asked', 'rate: 100'), '-p', 'runs_directory:=asked')
-    success, message = trigger('stop_recording')
+    success, message = graph.trigger('stop_recording')
     assert not success
     assert 'not recording' in message
     bags = []
     for _ in range(2):
-        success, message = trigger('start_recording')
+        success, message = graph.trigger('start_recording')
         assert success, message
         assert str(runs) in message
-        success, message = trigger('start_recording')
+        success, message = graph.trigger('start_recording')
         assert not success
         assert f'already recording to {runs}/asked_' in message
         turn()
-        success, message = trigger('stop_recording')
+        success, message = graph.trigger('stop_recording')
         assert success, message
         bags = sorted(runs.iterdir())
         assert str(bags[-1]) in message
@@ -223,11 +197,11 @@ def test_services_start_and_stop_a_recording(write_scene, start, folder, trigger
     assert node.end() == 0
 
 
-def test_snapshot_service_returns_an_absolute_folder(write_scene, start, folder, trigger, turn):
+def test_snapshot_service_returns_an_absolute_folder(graph, write_scene, start, folder, turn):
     scene = write_scene('kept', 'rate: 100\nrecord: {snapshot_seconds: 5, directory: kept}')
     start(scene)
     turn()
-    success, message = trigger('snapshot')
+    success, message = graph.trigger('snapshot')
     assert success, message
     assert f'recorded to {folder / "kept"}/kept_' in message
 
@@ -276,16 +250,15 @@ def test_refused_parameter_names_the_reason(graph, write_scene, start):
     assert 'Traceback' not in node.log
 
 
-def test_second_activation_counts_its_own_open_ticks(write_scene, start, change, turn):
-    # Reachable within 1.32 rad only; the first run is open for longer than the second.
+def test_second_activation_counts_its_own_open_ticks(graph, write_scene, start, turn):
     linkage = 'four_bar: {a: 1.0, b: 1.0, c: 1.0, d: 2.0}'
     scene = write_scene('again', 'rate: 200', linkage)
     node = start(scene, *BY_HAND, '-p', 'warning_period:=60.0', ready='')
-    assert change(Transition.TRANSITION_CONFIGURE)
+    assert graph.change_state(Transition.TRANSITION_CONFIGURE)
     for number, seconds in ((1, 2.0), (2, 0.8)):
-        assert change(Transition.TRANSITION_ACTIVATE)
+        assert graph.change_state(Transition.TRANSITION_ACTIVATE)
         turn(seconds, angle=3.0)
-        assert change(Transition.TRANSITION_DEACTIVATE)
+        assert graph.change_state(Transition.TRANSITION_DEACTIVATE)
         warnings = [line for line in node.log.splitlines() if ' ticks open by ' in line]
         assert len(warnings) == number
         assert int(warnings[-1].split(' ticks open')[0].split()[-1]) > 0

@@ -17,7 +17,6 @@ import sys
 import time
 
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 import pytest
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
@@ -190,11 +189,6 @@ def test_motion_topic_holds_positions_only_at_a_toggle(
 def test_motion_topic_appears_and_disappears_with_the_scene(
     graph, folder, write_scene, start, publisher, motions
 ):
-    def change(transition):
-        request = ChangeState.Request()
-        request.transition.id = transition
-        return graph.call(ChangeState, '/linkage_node/change_state', request).success
-
     def publishers():
         return graph.node.get_publishers_info_by_topic(MOTION)
 
@@ -202,17 +196,17 @@ def test_motion_topic_appears_and_disappears_with_the_scene(
     node = start(scene, '-p', 'autostart:=false', ready='')
     for _ in range(2):
         assert not publishers()
-        assert change(Transition.TRANSITION_CONFIGURE)
+        assert graph.change_state(Transition.TRANSITION_CONFIGURE)
         wait_for(publishers, 'the topic')
-        assert change(Transition.TRANSITION_ACTIVATE)
+        assert graph.change_state(Transition.TRANSITION_ACTIVATE)
         motions.clear()
         wait_for(lambda: publisher.publish(crank(0.5, 1.0)) or motions, 'a motion')
-        assert change(Transition.TRANSITION_DEACTIVATE)
-        assert change(Transition.TRANSITION_CLEANUP)
+        assert graph.change_state(Transition.TRANSITION_DEACTIVATE)
+        assert graph.change_state(Transition.TRANSITION_CLEANUP)
         wait_for(lambda: not publishers(), 'no topic')
     scene.write_text(scene.read_text().replace('acceleration', 'velocity'))
-    assert change(Transition.TRANSITION_CONFIGURE)
-    assert change(Transition.TRANSITION_ACTIVATE)
+    assert graph.change_state(Transition.TRANSITION_CONFIGURE)
+    assert graph.change_state(Transition.TRANSITION_ACTIVATE)
     assert not publishers()
     assert node.end() == 0
 

@@ -18,7 +18,6 @@ from linkage_ros.cli.main import main
 import pytest
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from .graph import crank, wait_for
 from ..support import disks
@@ -88,9 +87,9 @@ def test_node_publishes_although_its_bag_cannot_be_made(
     (line,) = [line for line in node.log.splitlines() if 'not recording' in line]
     assert reason in line
     assert str(directory) in line
-    answer = graph.call(Trigger, '/linkage_node/start_recording')
-    assert not answer.success
-    assert reason in answer.message
+    success, message = graph.trigger('start_recording')
+    assert not success
+    assert reason in message
     keeps_publishing()
     assert node.end() == INCOMPLETE
     assert 'Traceback' not in node.log
@@ -106,11 +105,11 @@ def test_bag_with_a_taken_name_gets_a_number(
     for name in ('bag_3', 'bag_4'):
         graph.wait_for_level('recording', OK)
         keeps_publishing()
-        assert graph.call(Trigger, '/linkage_node/stop_recording').success
+        assert graph.trigger('stop_recording')[0]
         with AnyReader([tmp_path / name]) as reader:
             assert reader.message_count > 0
         assert f'recording to {tmp_path}/{name}: bag exists already' in node.log
-        assert graph.call(Trigger, '/linkage_node/start_recording').success
+        assert graph.trigger('start_recording')[0]
     assert node.end() == 0
     assert [path.name for path in (tmp_path / 'bag').iterdir()] == ['mine']
 
@@ -236,7 +235,7 @@ def test_later_bag_does_not_hide_the_first_failure(
     directory, _ = cannot_begin(tmp_path, 'below a file')
     node = start(write_scene('again', scene_text(directory)))
     directory.unlink()
-    assert graph.call(Trigger, '/linkage_node/start_recording').success
+    assert graph.trigger('start_recording')[0]
     graph.wait_for_level('recording', OK)
     keeps_publishing()
     assert node.end() == INCOMPLETE

@@ -13,7 +13,6 @@ What robot_state_publisher does with both is done by yourdfpy here.
 """
 
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 from linkage_ros.bag import read_bag
 from linkage_ros.replay import IDENTICAL, recorded_scene, verify_replay
 from rclpy.node import Node
@@ -102,12 +101,10 @@ def test_robot_description_disappears_and_returns_with_the_scene(graph, write_sc
     start(write_scene('gone', TURNING + 'robot_description: true'))
     wait_for(lambda: graph.node.count_publishers(TOPIC) == 1, 'a publisher')
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
-        request = ChangeState.Request(transition=Transition(id=transition))
-        assert graph.call(ChangeState, '/linkage_node/change_state', request).success
+        assert graph.change_state(transition)
     wait_for(lambda: graph.node.count_publishers(TOPIC) == 0, 'no publisher')
     for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
-        request = ChangeState.Request(transition=Transition(id=transition))
-        assert graph.call(ChangeState, '/linkage_node/change_state', request).success
+        assert graph.change_state(transition)
     heard = late(graph)
     wait_for(lambda: heard, 'a robot model')
 

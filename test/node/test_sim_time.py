@@ -11,7 +11,6 @@
 import time
 
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 import pytest
 from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
@@ -199,8 +198,7 @@ def test_use_sim_time_is_refused_while_active(graph, write_scene, start):
         return graph.call(SetParameters, '/linkage_node/set_parameters', request).results[0]
 
     def transit(number):
-        request = ChangeState.Request(transition=Transition(id=number))
-        assert graph.call(ChangeState, '/linkage_node/change_state', request).success
+        assert graph.change_state(number)
 
     refused = set_use_sim_time(True)
     assert not refused.successful

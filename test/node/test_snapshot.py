@@ -19,7 +19,6 @@ import time
 from types import SimpleNamespace
 
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 from linkage_ros.bag import BagWriter, QosProfile
 from linkage_ros.description import load_scene
 from linkage_ros.node import RunRecording
@@ -28,7 +27,6 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from .graph import crank, NS, wait_for
 from ..support import disks
@@ -46,29 +44,6 @@ NOTHING = 'no snapshot was requested: nothing was written'
 def scene_text(directory, seconds, more='', rate=200):
     record = f'record: {{directory: {directory}, name: bag, snapshot_seconds: {seconds}{more}}}'
     return f'rate: {rate}\neffects: {{velocity: {{}}}}\n{record}'
-
-
-@pytest.fixture
-def ask(graph):
-    """Return a function that calls one of the node's services, and gives success and message."""
-
-    def ask(service='snapshot'):
-        answer = graph.call(Trigger, f'{NODE}/{service}')
-        return answer.success, answer.message
-
-    return ask
-
-
-@pytest.fixture
-def change(graph):
-    """Return a function that asks for a transition, which has to succeed."""
-
-    def change(transition):
-        request = ChangeState.Request()
-        request.transition.id = transition
-        assert graph.call(ChangeState, f'{NODE}/change_state', request).success
-
-    return change
 
 
 @pytest.fixture
@@ -122,20 +97,20 @@ def told(folder):
 
 
 def test_overlapping_snapshots_count_every_message(
-    graph, tmp_path, write_scene, start, crank_swings, ask, counts
+    graph, tmp_path, write_scene, start, crank_swings, counts
 ):
     runs = tmp_path / 'runs'
     node = start(write_scene('two', scene_text(runs, 3)))
     assert 'keeping the last 3 s in memory; ~/snapshot writes them' in node.log
     wait_for(lambda: counts('Received') > 100, 'joint states')
     assert not runs.exists(), 'no bag while it runs'
-    success, message = ask()
+    success, message = graph.trigger('snapshot')
     assert success, message
     assert f'recorded to {runs}/bag: ' in message
     # At the second, all has become too old that the first begins with, and not what it ends with.
     gone = counts('Discarded') + 20
     wait_for(lambda: counts('Discarded') > gone, 'what is too old')
-    success, message_2 = ask()
+    success, message_2 = graph.trigger('snapshot')
     assert success, message_2
     assert f'recorded to {runs}/bag_2: ' in message_2
     first, second = read(runs / 'bag'), read(runs / 'bag_2')
@@ -208,7 +183,7 @@ def small_disk(tmp_path):
 
 
 def test_snapshot_succeeds_after_the_disk_has_room_again(
-    graph, small_disk, write_scene, start, crank_swings, ask, counts
+    graph, small_disk, write_scene, start, crank_swings, counts
 ):
     with (small_disk / 'other').open('wb', buffering=0) as other, suppress(OSError):
         while True:
@@ -216,7 +191,7 @@ def test_snapshot_succeeds_after_the_disk_has_room_again(
     node = start(write_scene('full', scene_text(small_disk, 30)))
     wait_for(lambda: counts('In memory') > 20, 'joint states in memory')
     kept = counts('In memory')
-    success, message = ask()
+    success, message = graph.trigger('snapshot')
     assert not success
     assert message.startswith(
         f'no snapshot: {small_disk}/bag: cannot be recorded to: No space left on device; '
@@ -225,7 +200,7 @@ def test_snapshot_succeeds_after_the_disk_has_room_again(
     assert 'No space left' in graph.wait_for_level('recording', ERROR).message
     assert [path.name for path in small_disk.iterdir()] == ['other']
     (small_disk / 'other').unlink()
-    success, message = ask()
+    success, message = graph.trigger('snapshot')
     assert success, message
     there = [data for topic, _, data in read(small_disk / 'bag') if topic == '/joint_states']
     assert len(there) > kept
@@ -237,11 +212,11 @@ def test_snapshot_succeeds_after_the_disk_has_room_again(
 
 
 def test_disk_filled_by_a_snapshot_keeps_its_part(
-    small_disk, write_scene, start, crank_swings, ask, counts
+    graph, small_disk, write_scene, start, crank_swings, counts
 ):
     node = start(write_scene('fills', scene_text(small_disk, 60, rate=2000)))
     wait_for(lambda: counts('In memory') > 6000, 'more than the disk can take')
-    success, message = ask()
+    success, message = graph.trigger('snapshot')
     assert not success
     assert message.startswith(f'snapshot incomplete: {small_disk}/bag: ')
     assert 'No space left on device' in message
@@ -253,39 +228,41 @@ def test_disk_filled_by_a_snapshot_keeps_its_part(
 
 
 def test_each_activation_has_its_own_snapshot_memory(
-    tmp_path, write_scene, start, change, crank_swings, ask, counts
+    graph, tmp_path, write_scene, start, crank_swings, counts
 ):
     node = start(write_scene('lives', scene_text(tmp_path, 30)))
     wait_for(lambda: counts('In memory') > 20, 'joint states in memory')
-    change(Transition.TRANSITION_DEACTIVATE)
+    assert graph.change_state(Transition.TRANSITION_DEACTIVATE)
     assert NOTHING in node.log
-    success, message = ask()
+    success, message = graph.trigger('snapshot')
     assert (success, message) == (False, 'not active: nothing is kept in memory')
     begin = time.time_ns()
-    change(Transition.TRANSITION_ACTIVATE)
-    wait_for(lambda: ask()[0], 'a snapshot')
+    assert graph.change_state(Transition.TRANSITION_ACTIVATE)
+    wait_for(lambda: graph.trigger('snapshot')[0], 'a snapshot')
     messages = read(tmp_path / 'bag')
     assert min(log_time for _, log_time, _ in messages) > begin
     assert replayed(tmp_path / 'bag')['beginning_missing'] is None, 'all of its run is there'
-    change(Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    assert graph.change_state(Transition.TRANSITION_ACTIVE_SHUTDOWN)
     assert '1 snapshot written: ' in node.log
     assert node.end() == 0
 
 
-def test_reset_keeps_the_snapshot_memory(tmp_path, write_scene, start, crank_swings, ask, counts):
+def test_reset_keeps_the_snapshot_memory(
+    graph, tmp_path, write_scene, start, crank_swings, counts
+):
     node = start(write_scene('reset', scene_text(tmp_path, 60)))
     wait_for(lambda: counts('In memory') > 50, 'joint states in memory')
     before = counts('In memory')
-    assert ask('reset')[0]
+    assert graph.trigger('reset')[0]
     wait_for(lambda: counts('In memory') > 2 * before, 'more joint states in memory')
-    assert ask()[0]
+    assert graph.trigger('snapshot')[0]
     there = [data for topic, _, data in read(tmp_path / 'bag') if topic == '/joint_states']
     assert len(there) > 2 * before
     assert replayed(tmp_path / 'bag')['verdict'] == 'identical'
     assert node.end() == 0
 
 
-def test_snapshot_keeps_messages_before_a_clock_jump(graph, tmp_path, write_scene, start, ask):
+def test_snapshot_keeps_messages_before_a_clock_jump(graph, tmp_path, write_scene, start):
     start(write_scene('sim', scene_text(tmp_path, 3, rate=50)), '-p', 'use_sim_time:=true')
     clock = graph.publisher(Clock, '/clock')
     cranks = graph.publisher(JointState, '/crank_states')
@@ -312,7 +289,7 @@ def test_snapshot_keeps_messages_before_a_clock_jump(graph, tmp_path, write_scen
     # 2 s of simulated time at least; begun anew at 0, of which 1 s and some more is played.
     end = play(1000 * NS, 100)
     play(0, 60)  # what is heard here may be on its way into the memory
-    success, message = ask()
+    success, message = graph.trigger('snapshot')
     assert success, message
     times = [log_time for topic, log_time, _ in read(tmp_path / 'bag') if topic == '/joint_states']
     before = [time for time in times if time > 1000 * NS]
@@ -326,31 +303,31 @@ def test_snapshot_keeps_messages_before_a_clock_jump(graph, tmp_path, write_scen
 
 
 def test_recording_services_start_and_stop_the_snapshot_memory(
-    tmp_path, write_scene, start, crank_swings, ask, counts
+    graph, tmp_path, write_scene, start, crank_swings, counts
 ):
     node = start(write_scene('services', scene_text(tmp_path, 30)))
     keeping = 'keeping the last 30 s in memory; ~/snapshot writes them'
-    assert ask('start_recording') == (False, f'already {keeping}')
-    success, message = ask('stop_recording')
+    assert graph.trigger('start_recording') == (False, f'already {keeping}')
+    success, message = graph.trigger('stop_recording')
     assert success
     assert f'the memory has ended, {NOTHING}: ' in message
-    success, message = ask()
+    success, message = graph.trigger('snapshot')
     assert not success
     assert message.startswith('nothing is kept in memory; ')
     assert message.endswith(', or call ~/start_recording')
-    assert ask('start_recording') == (True, keeping)
+    assert graph.trigger('start_recording') == (True, keeping)
     wait_for(lambda: counts('In memory') > 20, 'joint states in memory')
-    assert ask()[0]
+    assert graph.trigger('snapshot')[0]
     assert 'begun in mid-run' in replayed(tmp_path / 'bag')['beginning_missing']
     assert node.end() == 0
 
 
 def test_scene_without_snapshot_seconds_refuses_a_snapshot(
-    tmp_path, write_scene, start, crank_swings, ask
+    graph, tmp_path, write_scene, start, crank_swings
 ):
     record = f'record: {{directory: {tmp_path}, name: bag}}'
     node = start(write_scene('usual', f'rate: 100\n{record}'))
-    success, message = ask()
+    success, message = graph.trigger('snapshot')
     assert not success
     assert message.startswith('nothing is kept in memory; write record.snapshot_seconds')
     assert node.end() == 0

@@ -58,13 +58,13 @@ class CarriedEfforts:
 
     """
 
-    def __init__(self, closure: Closure, given: Sequence[str], wanted: Sequence[str]) -> None:
+    def __init__(self, closure: Closure, measured: Sequence[str], wanted: Sequence[str]) -> None:
         self._closure = closure
         inputs = closure.linkage.inputs
         turning = dict(zip(closure.joint_names, closure.turning, strict=True))
-        turning |= {each.joint: not each.slider for each in inputs}
+        turning |= {driven.joint: not driven.slider for driven in inputs}
         units = {name: 1.0 if turns else closure.scale for name, turns in turning.items()}
-        for name in (*given, *wanted):
+        for name in (*measured, *wanted):
             if name not in units:
                 remedy = did_you_mean(name, units, f'it has {list_names(units)}')
                 raise DefinitionError(name, 'is not a joint of the linkage', remedy)
@@ -72,8 +72,8 @@ class CarriedEfforts:
             count = f'{len(inputs)} input{"s" * (len(inputs) != 1)}'
             names = list_names(wanted) or 'no joint'
             raise DefinitionError(names, f'for {count}', f'name {len(inputs)} different joints')
-        self._inputs = [(each.joint, units[each.joint]) for each in inputs]
-        self._given = [(name, units[name]) for name in given]
+        self._inputs = [(driven.joint, units[driven.joint]) for driven in inputs]
+        self._given = [(name, units[name]) for name in measured]
         self._wanted = [(name, units[name]) for name in wanted]
         self._solve = None if self._wanted == self._inputs else _compile_inverse(len(inputs))
 
@@ -107,7 +107,9 @@ class CarriedEfforts:
         slopes = [row[:count] for row in rows]
         if max(map(abs, chain.from_iterable(slopes))) > _MOST:
             return None
-        found = [sum(of * slope for of, slope in zip(efforts, row, strict=True)) for row in slopes]
+        carried = [
+            sum(of * slope for of, slope in zip(efforts, row, strict=True)) for row in slopes
+        ]
         if self._solve is not None:
             try:
                 inverse = self._solve(*chain.from_iterable(row[count:] for row in rows))
@@ -116,8 +118,8 @@ class CarriedEfforts:
             if inverse is None or not all(abs(entry) <= _MOST for entry in inverse[0]):
                 return None
             n = len(rows)
-            found = [sum(map(mul, found, inverse[0][k::n])) for k in range(n)]
-        return tuple(of / unit for of, (_, unit) in zip(found, self._wanted, strict=True))
+            carried = [sum(map(mul, carried, inverse[0][k::n])) for k in range(n)]
+        return tuple(of / unit for of, (_, unit) in zip(carried, self._wanted, strict=True))
 
 
 def _compile_inverse(count: int) -> Any:

@@ -128,10 +128,10 @@ class CrankBranch:
         self.period, self.rise = (period, self.high - self.low) if period else (0.0, 0.0)
         near = [
             [
-                abs(self._slope_of_rise(*evaluate(end + share * (other - end))))
+                abs(self._slope_of_rise(*evaluate(end + share * (far_end - end))))
                 for share in (_NEAR, _NEARER)
             ]
-            for end, other in ((self.first, self.last), (self.last, self.first))
+            for end, far_end in ((self.first, self.last), (self.last, self.first))
         ]
         # For both whether the output turns back there; else the range of the crank ends there.
         self.turns_back = tuple(10.0 * nearer < far for far, nearer in near)
@@ -230,11 +230,11 @@ class CrankBranch:
             step = step * ((square + value * y) / (square + y * y))
         for i, ((_, end), _, moved) in self._steep_cells.items():
             inside = place > float(i) if i else place < 1.0
-            way, found = self._without_turns(y - end), self._without_turns(value - end)
-            if not abs(found) > 0.25 * moved:
+            way, rise = self._without_turns(y - end), self._without_turns(value - end)
+            if not abs(rise) > 0.25 * moved:
                 return nan
             if inside:
-                step = step * (way + found) / (2.0 * found)
+                step = step * (way + rise) / (2.0 * rise)
         return step
 
     @staticmethod
@@ -327,10 +327,10 @@ class CrankBranch:
         if place == 1.0 or i not in self._steep_cells:
             fast, turning, square, last, least, most = self._known
             for count in range(1, 1 + _STEPS):
-                found = fast(crank, 1.0)
-                if found is None:
+                values = fast(crank, 1.0)
+                if values is None:
                     break
-                ((value,), (slope,)) = found
+                ((value,), (slope,)) = values
                 off = value - y
                 if turning:
                     off = remainder(off, tau)
@@ -487,7 +487,7 @@ class Inverse(NamedTuple):
 
     def find_cranks(self, value: float) -> list[tuple[int, float]]:
         """Return the cranks at which the output has a value, each after its branch."""
-        found = []
+        cranks_found = []
         for branch in self.branches:
             values = [value]
             if branch.rise:  # Poses may repeat after several turns of the output.
@@ -498,8 +498,8 @@ class Inverse(NamedTuple):
                 turns = range(ceil((lowest - value) / tau), floor((highest - value) / tau) + 1)
                 values = [value + tau * k for k in turns]
             cranks = [branch.find_crank(y)[0] for y in values if not branch.distance_beyond(y)]
-            found += [(branch.number, crank) for crank in cranks if not isnan(crank)]
-        return found
+            cranks_found += [(branch.number, crank) for crank in cranks if not isnan(crank)]
+        return cranks_found
 
     def find_branch(self, number: int | None = None, near: float | None = None) -> CrankBranch:
         """Return the branch of a number, or the one nearest a crank, or the only one."""
@@ -511,7 +511,7 @@ class Inverse(NamedTuple):
                 return branch
         unit = 'rad' if branches[0].crank_turns else 'm'
         choices = list_names(
-            f'{one.number} ({one.least:.6g} to {one.most:.6g} {unit})' for one in branches
+            f'{b.number} ({b.least:.6g} to {b.most:.6g} {unit})' for b in branches
         )
         if number is not None:
             raise DefinitionError(

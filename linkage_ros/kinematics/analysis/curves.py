@@ -104,11 +104,11 @@ def drawn_once(path: Sequence[complex]) -> tuple[complex, ...]:
     """Return a path; if it comes back on itself, only one way, so that dashes do not overlap."""
     if len(path) < 3:
         return tuple(path)
-    one = max(range(len(path)), key=lambda i: abs(path[i] - path[0]))
-    other = max(range(len(path)), key=lambda i: abs(path[i] - path[one]))
-    first, last = min(one, other), max(one, other) + 1
+    far = max(range(len(path)), key=lambda i: abs(path[i] - path[0]))
+    farthest = max(range(len(path)), key=lambda i: abs(path[i] - path[far]))
+    first, last = min(far, farthest), max(far, farthest) + 1
     there = path[first:last]
-    near = _SAME_PATH * abs(path[one] - path[other])
+    near = _SAME_PATH * abs(path[far] - path[farthest])
     back = (*path[:first], *path[last:])
     if all(min(abs(place - known) for known in there) <= near for place in back[::4]):
         return tuple(there)

@@ -104,17 +104,17 @@ def _exchange_at(closure: Built, names: Sequence[str], at: Sequence[float]) -> B
     check_moved(closure, names, position)
     plan = closure.plan_exchange(names, near)
     try:
-        found: Built = plan(position, {}, {})
-        if found.grids and (limits := _reached_limits(closure, names, at)):
-            found = plan(position, {}, limits)
+        exchanged: Built = plan(position, {}, {})
+        if exchanged.grids and (limits := _reached_limits(closure, names, at)):
+            exchanged = plan(position, {}, limits)
     except DefinitionError as error:
         reason = f'do not move all of it: {error.where}: {error.reason}'
         raise DefinitionError(', '.join(names), reason, 'name other joints') from None
-    if not _meets(closure, found, position, {}):
+    if not _meets(closure, exchanged, position, {}):
         raise DefinitionError(
             ', '.join(names), 'do not close in the assembly of the pose', 'name other joints'
         )
-    return found
+    return exchanged
 
 
 def _exchange_on_branch(closure: Built, name: str, branch: CrankBranch) -> Built:
@@ -130,15 +130,15 @@ def _exchange_on_branch(closure: Built, name: str, branch: CrankBranch) -> Built
     error = DefinitionError(name, reason, remedy)
     for value, crank in map(branch.state_at, _STARTS):
         try:
-            found: Built = plan(closure.close_unlimited(crank), {name: value}, {})
+            exchanged: Built = plan(closure.close_unlimited(crank), {name: value}, {})
         except DefinitionError as refused:
             error = refused
             continue
         if all(
-            _meets(closure, found, closure.close_unlimited(crank), {name: value})
+            _meets(closure, exchanged, closure.close_unlimited(crank), {name: value})
             for value, crank in map(branch.state_at, _TRIED)
         ):
-            return found
+            return exchanged
     raise error
 
 
@@ -151,18 +151,18 @@ def _values_at(
 
 def _meets(
     closure: Closure,
-    found: Closure,
+    exchanged: Closure,
     position: Position,
     known: Mapping[str, float],
 ) -> bool:
     """Return whether a closure has the joints of a position of the linkage."""
     values = _values_at(closure, position, known)
-    again = found.close_unlimited(*(values[name] for name in found.input_names))
+    again = exchanged.close_unlimited(*(values[name] for name in exchanged.input_names))
     return bool(again.joints) and all(
         abs(sin(0.5 * (again[name] - values[name]))) < _SAME
         if turning
         else abs(again[name] - values[name]) < _SAME * closure.scale
-        for name, turning in zip(found.joint_names, found.turning, strict=True)
+        for name, turning in zip(exchanged.joint_names, exchanged.turning, strict=True)
     )
 
 
@@ -173,7 +173,7 @@ def check_moved(closure: Closure, names: Sequence[str], position: Position) -> N
     import numpy as np  # local import: one input does without it
 
     # Of lengths in sizes of the linkage.
-    units = [closure.scale if given.slider else 1.0 for given in closure.linkage.inputs]
+    units = [closure.scale if driven.slider else 1.0 for driven in closure.linkage.inputs]
     own = [1.0 if turning else closure.scale for turning in closure.turning]
     scaled = closure.jacobian(position) * units / np.array(own)[:, None]
     slopes = scaled[[closure.joint_names.index(name) for name in names]]
@@ -201,10 +201,10 @@ def turn_to_pose(closure: Closure, values: Sequence[float]) -> tuple[float, ...]
         return tuple(values)
     return tuple(
         value
-        if given.slider
-        or (given.limits.is_bounded and given.limits.low <= value <= given.limits.high)
+        if driven.slider
+        or (driven.limits.is_bounded and driven.limits.low <= value <= driven.limits.high)
         else value - tau * round((value - at) / tau)
-        for value, given, at in zip(values, inputs, home, strict=True)
+        for value, driven, at in zip(values, inputs, home, strict=True)
     )
 
 
@@ -225,7 +225,9 @@ def _reached_limits(
         if not own.get(name, NO_LIMITS).is_bounded
     }
     turns = [tau if closure.turning[row] else inf for row in rows.values()]
-    steps = [_STEP * (closure.scale if given.slider else 1.0) for given in closure.linkage.inputs]
+    steps = [
+        _STEP * (closure.scale if driven.slider else 1.0) for driven in closure.linkage.inputs
+    ]
     first = closure.position(*at).joints
     if not first:
         return {}
@@ -251,7 +253,7 @@ def _reached_limits(
         if position.status is Status.LIMITED:
             continue
         for k, way in product(range(len(steps)), (-1, 1)):
-            beside = tuple(one + way * (i == k) for i, one in enumerate(place))
+            beside = tuple(number + way * (i == k) for i, number in enumerate(place))
             if beside not in met:
                 met.add(beside)
                 waiting.append((beside, values))
@@ -277,8 +279,10 @@ class PlaneExchange:
     ) -> None:
         self._closure, self._names, self._rebuild = closure, names, rebuild
         linkage = closure.linkage
-        driven = {given.joint: given for given in linkage.inputs}
-        joints = {name: _as_joint(given, near[name]) for name, given in driven.items()}
+        driven = {driven.joint: driven for driven in linkage.inputs}
+        joints = {
+            name: _as_joint(driven_joint, near[name]) for name, driven_joint in driven.items()
+        }
         joints |= {name: joint for name, joint in linkage.joints.items() if name not in driven}
         inputs = [driven.get(name) or Input.from_joint(name, joints[name]) for name in names]
         # The inputs as joints, and the other joints.
@@ -317,13 +321,13 @@ class PlaneExchange:
                     place = places[link, point]
                     points[point] = (place.real, place.imag)
         drawn = AssemblyPose(
-            tuple(_turn_within(values[given.joint], given) for given in linkage.inputs),
+            tuple(_turn_within(values[driven.joint], driven) for driven in linkage.inputs),
             points,
             {link: angle for link, angle in angles.items() if link in linkage.links},
         )
         inputs = tuple(
-            replace(given, limits=limits.get(given.joint, given.limits))
-            for given in linkage.inputs
+            replace(driven, limits=limits.get(driven.joint, driven.limits))
+            for driven in linkage.inputs
         )
         return self._rebuild(replace(linkage, inputs=inputs, pose=drawn))
 
@@ -337,25 +341,25 @@ class PlaneExchange:
         linkage = self._linkage
         self._carriers: dict[str, tuple[str, tuple[str, str], str]] = {}
         inputs, links, sliders = [], dict(linkage.links), dict(linkage.sliders)
-        for given in linkage.inputs:
-            parent, child = (linkage.links.get(end, {}) for end in (given.parent, given.child))
-            held = given
-            if not given.slider and not {*parent} & {*child}:
-                carrier, block = f'carrier of {given.joint}', f'block of {given.joint}'
+        for driven in linkage.inputs:
+            parent, child = (linkage.links.get(end, {}) for end in (driven.parent, driven.child))
+            held = driven
+            if not driven.slider and not {*parent} & {*child}:
+                carrier, block = f'carrier of {driven.joint}', f'block of {driven.joint}'
                 pin, through = next(iter(child)), next(iter(parent))
                 links[carrier], links[block] = {carrier: (0.0, 0.0)}, {pin: (0.0, 0.0)}
-                along = Slider(carrier, given.parent, through, (1.0, 0.0), carrier)
+                along = Slider(carrier, driven.parent, through, (1.0, 0.0), carrier)
                 sliders[carrier] = along
                 sliders[block] = Slider(pin, carrier, carrier, (0.0, 1.0), block)
-                self._carriers[carrier] = given.parent, (given.child, pin), block
-                held = replace(given, parent=block)
+                self._carriers[carrier] = driven.parent, (driven.child, pin), block
+                held = replace(driven, parent=block)
             inputs.append(held)
         self._linkage = replace(linkage, inputs=tuple(inputs), links=links, sliders=sliders)
 
 
-def _as_joint(given: Input, near: tuple[float, ...]) -> RevoluteJoint | SlideJoint:
+def _as_joint(driven: Input, near: tuple[float, ...]) -> RevoluteJoint | SlideJoint:
     """Return a former input as a joint, whose angle comes round to limits on one side."""
-    joint = given.as_joint()
+    joint = driven.as_joint()
     if isinstance(joint, SlideJoint):
         return joint
     if inf in (-joint.limits.low, joint.limits.high):
@@ -363,11 +367,11 @@ def _as_joint(given: Input, near: tuple[float, ...]) -> RevoluteJoint | SlideJoi
     return replace(joint, near=near)
 
 
-def _turn_within(value: float, given: Input) -> float:
+def _turn_within(value: float, driven: Input) -> float:
     """Return the value of a new input, with the whole turns that its limits allow."""
-    low, high = given.limits.low, given.limits.high
+    low, high = driven.limits.low, driven.limits.high
     if inf in (-low, high):
         return value
-    if not given.slider:
+    if not driven.slider:
         value -= tau * round((value - 0.5 * (low + high)) / tau)
     return min(max(value, low), high)

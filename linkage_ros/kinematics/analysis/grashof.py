@@ -106,9 +106,9 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     return FourBarType(*CHANGE_POINTS[sides.index(shortest)], 0.0)
 
 
-def nearly_equal(one: float, other: float) -> bool:
+def nearly_equal(first: float, second: float) -> bool:
     """Return whether two lengths are equal up to a rounded digit."""
-    return abs(one - other) <= NEARLY * max(one, other)
+    return abs(first - second) <= NEARLY * max(first, second)
 
 
 def nearly_paired(a: float, b: float, c: float, d: float) -> Paired | None:
@@ -121,14 +121,16 @@ def nearly_paired(a: float, b: float, c: float, d: float) -> Paired | None:
     if 0.0 in exact:
         return None
     opposite, beside, across = ((a, c), (b, d)), ((a, b), (c, d)), ((a, d), (b, c))
-    found = [one for one in (opposite, beside, across) if all(nearly_equal(p, q) for p, q in one)]
-    if not found:
+    pairings = [
+        pair for pair in (opposite, beside, across) if all(nearly_equal(p, q) for p, q in pair)
+    ]
+    if not pairings:
         return None
-    name = 'parallelogram' if found[0] is opposite else 'kite'
-    deviation = max(abs(p - q) for p, q in found[0])
-    if len(found) > 1:
+    name = 'parallelogram' if pairings[0] is opposite else 'kite'
+    deviation = max(abs(p - q) for p, q in pairings[0])
+    if len(pairings) > 1:
         name, deviation = 'rhombus', max(a, b, c, d) - min(a, b, c, d)
-    return Paired(name, deviation, (True, found[0] is not across))
+    return Paired(name, deviation, (True, pairings[0] is not across))
 
 
 class FourBarLengths(NamedTuple):
@@ -170,8 +172,8 @@ def _four_bar(
         closing = dyad.inner.name
         ((coupler,), (output,)) = dyad.bodies
         a, b, c, d = (
-            abs(complex(*links[link][one]) - complex(*links[link][other]))
-            for link, one, other in (
+            abs(complex(*links[link][first]) - complex(*links[link][second]))
+            for link, first, second in (
                 (arm, pivot, start),
                 (coupler, start, closing),
                 (output, closing, end),

@@ -40,7 +40,7 @@ def with_measured(linkage: Linkage, names: Sequence[str]) -> Linkage:
 
     A name that is neither a joint nor describes what moves raises DefinitionError.
     """
-    driven = {given.joint: given for given in linkage.inputs}
+    driven = {driven.joint: driven for driven in linkage.inputs}
     for name in names:
         if name in linkage.joints:
             continue
@@ -70,7 +70,7 @@ def _add_measured(linkage: Linkage, name: str) -> Linkage:
         added = _with_distance(linkage, name, *ends)
     else:
         coordinates = (f'{point}.{axis}' for point in linkage.traced for axis in linkage.axes)
-        known = [*(given.joint for given in linkage.inputs), *linkage.joints, *coordinates]
+        known = [*(driven.joint for driven in linkage.inputs), *linkage.joints, *coordinates]
         raise DefinitionError(
             name or quote(name), 'is not a joint, and describes no point, distance or angle',
             did_you_mean(
@@ -89,9 +89,9 @@ def point_pair(name: str, points: Collection[str]) -> tuple[str, str] | None:
     return next((pair for pair in pairs if pair[0] in points and pair[1] in points), None)
 
 
-def check_apart(name: str, one: Sequence[str], other: Sequence[str]) -> None:
+def check_apart(name: str, first: Sequence[str], second: Sequence[str]) -> None:
     """Refuse the distance of two points that one link carries; these are their carriers."""
-    both = [link for link in one if link in other]
+    both = [link for link in first if link in second]
     if both:
         raise DefinitionError(
             name, f'both points are on {both[0]}: their distance does not change',

@@ -87,7 +87,7 @@ def monotonic_pieces(
         cranks = [crank + (high - low) * 0.307 / count for crank in cranks]
     sampler = _Sampler(evaluate)
     refined = list(sampler.refine(cranks))
-    sampled = [each[:3] for each in refined]
+    sampled = [sample[:3] for sample in refined]
     jumps, beside = list(sampler.jumps(refined)), _BESIDE_JUMP * (high - low)
     turns = [
         turn
@@ -197,10 +197,10 @@ class _Sampler:
                 before, _ = waiting.pop(), depths.pop()
                 yield before
 
-    def excess(self, one: _OutputSample, other: _OutputSample) -> float:
+    def excess(self, first: _OutputSample, second: _OutputSample) -> float:
         """Return the change of the angle beyond what its slopes lead to, without whole turns."""
-        change = 0.5 * (one.angle_slope + other.angle_slope) * (other.crank - one.crank)
-        return abs(remainder(other.angle - one.angle - change, self._period))
+        change = 0.5 * (first.angle_slope + second.angle_slope) * (second.crank - first.crank)
+        return abs(remainder(second.angle - first.angle - change, self._period))
 
     def jumps(self, sampled: Sequence[_OutputSample]) -> Iterator[float]:
         """
@@ -208,7 +208,7 @@ class _Sampler:
 
         A link that points to such a pin points the other way after it.
         """
-        known = [each for each in sampled if isfinite(each.angle_slope)]
+        known = [sample for sample in sampled if isfinite(sample.angle_slope)]
         for low, high in pairwise(known):
             if self.excess(low, high) >= _JUMP:
                 yield from self._jump_between(low, high)
@@ -241,13 +241,13 @@ def _poles(
     if evaluate.turning:
         return
     known = sorted([*sampled, *((turn, *evaluate(turn)) for turn in turns)])
-    known = [each for each in known if isfinite(each[1])]
-    for (before, one, _), (after, other, _) in pairwise(known):
+    known = [sample for sample in known if isfinite(sample[1])]
+    for (before, first, _), (after, second, _) in pairwise(known):
         # Symmetric linkages have poles in the middle between samples.
         slope = evaluate(before + 0.307 * (after - before))[1]
-        if not (other - one) * slope < 0.0:
+        if not (second - first) * slope < 0.0:
             continue
-        low, high = (before, one), (after, other)
+        low, high = (before, first), (after, second)
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low[0] + high[0])
             value = evaluate(middle)[0]
@@ -271,8 +271,8 @@ def _real_turns(
     slight = _FLAT * evaluate.size
     kept: list[float] = []
 
-    def are_same(one: float, other: float) -> bool:
-        off = evaluate(one)[0] - evaluate(other)[0]
+    def are_same(first: float, second: float) -> bool:
+        off = evaluate(first)[0] - evaluate(second)[0]
         return abs(remainder(off, tau) if evaluate.turning else off) <= slight
 
     for end in ends:
@@ -285,7 +285,9 @@ def _real_turns(
         return [
             end
             for end in kept
-            if not any(abs(end - one) < _BESIDE and are_same(end, one) for one in outer)
+            if not any(
+                abs(end - outer_end) < _BESIDE and are_same(end, outer_end) for outer_end in outer
+            )
         ]
     if len(kept) > 1 and interval.highest - kept[-1] + kept[0] - interval.lowest < _BESIDE:
         return kept[1:-1] if are_same(kept[0], kept[-1]) else kept
@@ -295,8 +297,8 @@ def _real_turns(
 def _unwrap_piece(piece: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Return a piece with unwrapped angles, its middle in (−π, π]."""
     (first, value), *others = piece
-    found = [(first, value)]
+    unwrapped = [(first, value)]
     for crank, angle in others:
-        found.append((crank, angle - tau * round((angle - found[-1][1]) / tau)))
-    turns = tau * round(0.5 * (found[0][1] + found[-1][1]) / tau)
-    return [(crank, angle - turns) for crank, angle in found]
+        unwrapped.append((crank, angle - tau * round((angle - unwrapped[-1][1]) / tau)))
+    turns = tau * round(0.5 * (unwrapped[0][1] + unwrapped[-1][1]) / tau)
+    return [(crank, angle - turns) for crank, angle in unwrapped]

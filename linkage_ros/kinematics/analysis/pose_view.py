@@ -58,7 +58,7 @@ def prepare_view(
     interval = _find_range(input_sweep, about)
     shift = about.shift(value) if about.is_whole else interval.lowest - about.lowest
     if ghosts:
-        behind = [_close_loops(closure, given) for given in ghosts]
+        behind = [_close_loops(closure, inputs) for inputs in ghosts]
     elif interval.is_whole:
         turn = interval.highest - interval.lowest
         behind = [
@@ -117,8 +117,10 @@ def _ends_text(interval: InputRange) -> str:
 def pose_text(closure: Any, inputs: tuple[float, ...]) -> str:
     """Return the inputs of a pose as text, each with its joint."""
     return ', '.join(
-        f'{given.joint} {value:.4g} m' if given.slider else f'{given.joint} {degrees(value):.4g}°'
-        for given, value in zip(closure.linkage.inputs, inputs, strict=True)
+        f'{driven.joint} {value:.4g} m'
+        if driven.slider
+        else f'{driven.joint} {degrees(value):.4g}°'
+        for driven, value in zip(closure.linkage.inputs, inputs, strict=True)
     )
 
 
@@ -137,12 +139,12 @@ def symbol_size(shown: LinkageView) -> float:
     picture = abs(high - low)
     points = shown.closure.points(shown.position)
     bars = [
-        abs(points[link, one] - points[link, other])
+        abs(points[link, first] - points[link, second])
         for link, named in shown.closure.linkage.links.items()
         if link != GROUND
-        for one in named
-        for other in named
-        if one < other and points[link, one] != points[link, other]
+        for first in named
+        for second in named
+        if first < second and points[link, first] != points[link, second]
     ]
     shortest = min(bars, default=picture)
     return bar_size(picture, shortest)

@@ -73,20 +73,20 @@ def golden_section(
     function: Callable[[float], float], low: float, high: float
 ) -> tuple[float, float]:
     """Return the minimum and minimiser of a function on an interval, by golden section."""
-    one, other = high - _RATIO * (high - low), low + _RATIO * (high - low)
-    at_one, at_other = function(one), function(other)
+    first, second = high - _RATIO * (high - low), low + _RATIO * (high - low)
+    at_one, at_other = function(first), function(second)
     for _ in range(80):
-        if not low < one < other < high:
+        if not low < first < second < high:
             break
         if at_one <= at_other:
-            high, other, at_other = other, one, at_one
-            one = high - _RATIO * (high - low)
-            at_one = function(one)
+            high, second, at_other = second, first, at_one
+            first = high - _RATIO * (high - low)
+            at_one = function(first)
         else:
-            low, one, at_one = one, other, at_other
-            other = low + _RATIO * (high - low)
-            at_other = function(other)
-    return min((at_one, one), (at_other, other))
+            low, first, at_one = first, second, at_other
+            second = low + _RATIO * (high - low)
+            at_other = function(second)
+    return min((at_one, first), (at_other, second))
 
 
 def closing_ranges(closure: Closure) -> tuple[InputRange, ...]:
@@ -439,7 +439,7 @@ def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
 def within_own(closure: Closure, ranges: Sequence[InputRange]) -> tuple[InputRange, ...]:
     """Return the parts of ranges within the limits of the single input itself."""
     (bound,) = closure.bounds.inputs
-    return tuple(part for one in ranges for part in _cut_by_limits(closure, one, bound))
+    return tuple(part for interval in ranges for part in _cut_by_limits(closure, interval, bound))
 
 
 def within_published(
@@ -447,8 +447,8 @@ def within_published(
 ) -> tuple[InputRange, ...]:
     """Return the parts of ranges of the single input within limits of published joints."""
     if not closure.bounds.inputs:
-        ranges = [copy for one in ranges for copy in _range_and_copy(closure, one)]
-    return tuple(part for one in ranges for part in _within_limits(closure, one, bounds))
+        ranges = [copy for interval in ranges for copy in _range_and_copy(closure, interval)]
+    return tuple(part for interval in ranges for part in _within_limits(closure, interval, bounds))
 
 
 def _range_and_copy(closure: Closure, interval: InputRange) -> Iterator[InputRange]:

@@ -81,7 +81,7 @@ class ReachBox(NamedTuple):
 
 def find_reached_values(closure: Closure) -> list[ReachedValues]:
     """Return what is reached within each of the `reach_boxes`."""
-    return [found for box in reach_boxes(closure) for found in _search_box(box)]
+    return [reached for box in reach_boxes(closure) for reached in _search_box(box)]
 
 
 def reach_boxes(closure: Closure) -> Iterator[ReachBox]:

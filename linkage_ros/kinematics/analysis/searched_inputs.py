@@ -90,15 +90,15 @@ def search_inputs(closure: Closure, wanted: Mapping[str, float]) -> Searched:
                 break
             steps[opened] *= 0.5
         inputs = better
-    found: list[tuple[float, ...]] = []
+    solutions: list[tuple[float, ...]] = []
     for row in inputs[(np.abs(errors) < _NEAR).all(axis=1)].tolist():
-        if not any(search.is_same(row, other) for other in found):
+        if not any(search.is_same(row, known) for known in solutions):
             solution = search.polish(row)
-            if solution and not any(search.is_same(solution, other) for other in found):
-                found.append(solution)
-    beyond = {each: closure.position(*each).status is Status.LIMITED for each in found}
-    found.sort(key=lambda each: (beyond[each], each))
-    return Searched(found, len(starts), reach)
+            if solution and not any(search.is_same(solution, known) for known in solutions):
+                solutions.append(solution)
+    beyond = {inputs: closure.position(*inputs).status is Status.LIMITED for inputs in solutions}
+    solutions.sort(key=lambda inputs: (beyond[inputs], inputs))
+    return Searched(solutions, len(starts), reach)
 
 
 class _Search:
@@ -113,10 +113,12 @@ class _Search:
         self._turning = np.array([closure.turning[row] for row in self._rows])
         self._units = np.where(self._turning, 1.0, closure.scale)
         inputs = closure.linkage.inputs
-        self._input_units = np.array([closure.scale if one.slider else 1.0 for one in inputs])
+        self._input_units = np.array(
+            [closure.scale if driven.slider else 1.0 for driven in inputs]
+        )
         # Links that close only together are followed from the pose, and not a turn away.
         self._wraps = [
-            not (one.slider or one.limits.is_bounded or closure.grids) for one in inputs
+            not (driven.slider or driven.limits.is_bounded or closure.grids) for driven in inputs
         ]
 
     def errors_at(self, inputs: Array) -> tuple[Array, Array]:
@@ -171,10 +173,12 @@ class _Search:
             at = (np.array(at) - self.steps_from(errors, slopes)[0]).tolist()
         return tuple(best) if least < _MET else None
 
-    def is_same(self, one: Sequence[float], other: Sequence[float]) -> bool:
+    def is_same(self, first: Sequence[float], second: Sequence[float]) -> bool:
         """Return whether inputs are one solution, apart from turns without limits."""
         ways = (
             (remainder(a - b, tau) if turns else a - b) / unit
-            for a, b, turns, unit in zip(one, other, self._wraps, self._input_units, strict=True)
+            for a, b, turns, unit in zip(
+                first, second, self._wraps, self._input_units, strict=True
+            )
         )
         return all(abs(way) < _APART for way in ways)

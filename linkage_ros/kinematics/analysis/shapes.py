@@ -266,7 +266,7 @@ def round_corners(corners: Sequence[complex], radius: float) -> tuple[complex, .
 
 def _pitch_circles(pose: _DrawnPose) -> Iterator[tuple[str, Shape]]:
     """Yield the pitch circles of gears, and belts on pulleys: ratios of pins on a common link."""
-    driven = {given.joint: given for given in pose.closure.linkage.driven_joints}
+    driven = {driven.joint: driven for driven in pose.closure.linkage.driven_joints}
     for name, ratio in pose.closure.linkage.ratios.items():
         joints = [driven[name], driven.get(ratio.of) or pose.closure.linkage.joints[ratio.of]]
         ends = [(getattr(j, 'parent', ''), getattr(j, 'child', '')) for j in joints]
@@ -278,15 +278,15 @@ def _pitch_circles(pose: _DrawnPose) -> Iterator[tuple[str, Shape]]:
         pins = [sorted({*links[link]} & {*links[carrier]}) for link in turning]
         if not all(pins) or turning[0] == turning[1]:
             continue
-        one, other = (pose.points[carrier, shared[0]] for shared in pins)
-        apart, size = other - one, abs(ratio.ratio)
+        first, second = (pose.points[carrier, shared[0]] for shared in pins)
+        apart, size = second - first, abs(ratio.ratio)
         same = (ends[0][0] == carrier) == (ends[1][0] == carrier)
         meshes = (ratio.ratio < 0.0) == same
         radius = abs(apart) * (1.0 if meshes else _PULLEYS) / (1.0 + size)
         radii = radius, size * radius
         if not radius:
             continue
-        for link, centre, r in zip(turning, (one, other), radii, strict=True):
+        for link, centre, r in zip(turning, (first, second), radii, strict=True):
             turns = [pose.angles[link] + k * tau / _PITCH_PARTS for k in range(_PITCH_PARTS + 1)]
             places = [centre + rect(r, turn) for turn in turns]
             for k, place in enumerate(places[1:]):
@@ -296,7 +296,7 @@ def _pitch_circles(pose: _DrawnPose) -> Iterator[tuple[str, Shape]]:
             lean = asin((radii[0] - radii[1]) / abs(apart))
             for side in (1.0, -1.0):
                 across = rect(1.0, phase(apart) + side * (0.5 * pi - lean))
-                ends_of_belt = one + radii[0] * across, other + radii[1] * across
+                ends_of_belt = first + radii[0] * across, second + radii[1] * across
                 yield carrier, Segment('rail', name, *ends_of_belt)
 
 
@@ -372,7 +372,7 @@ def _ground_rail(pose: _DrawnPose, name: str, slider: Slider) -> list[Shape]:
 def _draw_block(pose: _DrawnPose, name: str, slider: Slider) -> Polygon:
     centre = pose.points[pose.closure.structure.blocks[name], slider.point]
     _, unit = _slider_line(pose, slider)
-    driven = any(given.slider == name for given in pose.closure.linkage.inputs)
+    driven = any(driven.slider == name for driven in pose.closure.linkage.inputs)
     half, across = 2.2 * pose.size * unit, 1.5j * pose.size * unit
     return Polygon(
         'input' if driven else 'block',

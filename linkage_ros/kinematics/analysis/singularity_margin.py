@@ -51,9 +51,9 @@ _FARTHEST = StepMargin(0.5 * pi, 1.0, -1)
 
 def singularity_margin(closure: Closure, position: Position) -> SingularityMargin:
     """Return the margin of a closed position to a singularity."""
-    found = [*step_margins(closure, position)]
-    angle = min((each.transmission_angle for each in found), default=0.5 * pi)
-    weakest = min(found, key=lambda each: min(each.conditioning, 1.0), default=_FARTHEST)
+    margins = [*step_margins(closure, position)]
+    angle = min((margin.transmission_angle for margin in margins), default=0.5 * pi)
+    weakest = min(margins, key=lambda margin: min(margin.conditioning, 1.0), default=_FARTHEST)
     distance = inf
     if len(closure.linkage.inputs) == 1:
         sliding = bool(closure.linkage.inputs[0].slider)
@@ -104,11 +104,11 @@ def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
         find_zeros,  # local import: it needs the closure
     )
 
-    given = closure.linkage.inputs
-    if len(given) > 1:
+    inputs = closure.linkage.inputs
+    if len(inputs) > 1:
         return ()
     ends = [end for interval in closure.closing_ranges for end in interval.toggles]
-    found = [SingularInput(end, Status.TOGGLE) for end in ends]
+    singular = [SingularInput(end, Status.TOGGLE) for end in ends]
     # All dyads are evaluated at the same states.
     posed = lru_cache(_STATES)(closure.close_unlimited)
     for index, step in enumerate(closure.steps):
@@ -121,17 +121,17 @@ def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
             )
         for place in places:
             status = _singular_status(closure, index, place)
-            distances = (abs(signed_distance(closure, place, one.value)) for one in found)
+            distances = (abs(signed_distance(closure, place, known.value)) for known in singular)
             if status is not None and all(apart > _SAME for apart in distances):
-                found.append(SingularInput(place, status))
-    return tuple(sorted(found, key=attrgetter('value')))
+                singular.append(SingularInput(place, status))
+    return tuple(sorted(singular, key=attrgetter('value')))
 
 
 def _move_within(closure: Closure, value: float) -> float:
     """Return the input of the same pose within the ranges: for a cylinder its other length."""
     zero = closure.zero_length
     ranges = closure.closing_ranges
-    if zero is None or any(one.lowest <= value <= one.highest for one in ranges):
+    if zero is None or any(interval.lowest <= value <= interval.highest for interval in ranges):
         return value
     return 2.0 * zero - value
 

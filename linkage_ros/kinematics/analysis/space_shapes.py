@@ -137,11 +137,11 @@ class SpaceDrawing:
         turns = np.array([frames[link][1] for link in self._links])
         axis, arms = turns[:, :3], np.array(self._arms)
         half = np.cross(axis, arms)
-        found = np.asarray(origins + arms + 2.0 * (turns[:, 3:] * half + np.cross(axis, half)))
-        for row, one, other, length in self.tubes:
-            way = found[other] - found[one]
-            found[row] = found[one] + way * min(length / np.linalg.norm(way), 0.9)
-        return found
+        places = np.asarray(origins + arms + 2.0 * (turns[:, 3:] * half + np.cross(axis, half)))
+        for row, first, second, length in self.tubes:
+            way = places[second] - places[first]
+            places[row] = places[first] + way * min(length / np.linalg.norm(way), 0.9)
+        return places
 
     def tracker(self) -> SpatialTracker:
         """Return a tracker of all places but those of ``tubes``, for compiled code."""
@@ -169,7 +169,7 @@ class SpaceDrawing:
     def below(self, number: int) -> list[int]:
         """Return the numbers of the parts before which a part is painted."""
         joins = self.parts[number].joins
-        return [i for i, other in enumerate(self.parts[:number]) if other.name in joins]
+        return [i for i, part in enumerate(self.parts[:number]) if part.name in joins]
 
     def _pose_place(self, row: int) -> Places:
         return self._arms[row] + self._origins[self._links[row]]
@@ -190,7 +190,7 @@ class SpaceDrawing:
 
     def _hinge_centres(self) -> dict[str, list[Places]]:
         """Return where the symbols of the hinges stand in the pose."""
-        linkage, found = self.linkage, {}
+        linkage, centres_of = self.linkage, {}
         ways: list[Places] = []
         for name, hinge in linkage.hinges.items():
             at, way = np.array(hinge.at), _unit(hinge)
@@ -204,11 +204,11 @@ class SpaceDrawing:
                 side = last if abs(last) > 0.1 else -float(way @ np.sum(ways, axis=0))
                 ways.append(way if side >= 0.0 else -way)
                 centres = [at + self._radius * ways[-1]]
-            found[name] = centres or [at]
-            for centre in found[name]:
+            centres_of[name] = centres or [at]
+            for centre in centres_of[name]:
                 for link in (hinge.parent, hinge.child):
                     self.joints[name] = self._carry(link, centre)
-        return found
+        return centres_of
 
     def _hinge_parts(self, centres: dict[str, list[Places]]) -> Iterator[Part]:
         together = Counter(hinge.at for hinge in self.linkage.hinges.values())
@@ -252,8 +252,8 @@ class SpaceDrawing:
             yield Part(role, name, ends, 1.6, joins=(slide.parent, slide.child))
 
     def _strut_parts(self) -> Iterator[Part]:
-        for name, (one, other) in self.linkage.struts.items():
-            start, end = self.points[one], self.points[other]
+        for name, (first, second) in self.linkage.struts.items():
+            start, end = self.points[first], self.points[second]
             (tube,) = self._add_places(GROUND, np.zeros(3))
             length = 0.55 * dist(self._pose_place(start), self._pose_place(end))
             self.tubes.append((tube, start, end, length))
@@ -278,11 +278,11 @@ class SpaceDrawing:
     def _arc(self, link: str, start: int, end: int) -> tuple[int, ...]:
         """Return places of an arc between two on the sphere; none without a sphere."""
         centre = next((np.array(hinge.at) for hinge in self.linkage.hinges.values()), np.zeros(3))
-        one, other = (self._pose_place(row) - centre for row in (start, end))
-        off = max(abs(np.linalg.norm(way) - self._radius) for way in (one, other))
+        first, second = (self._pose_place(row) - centre for row in (start, end))
+        off = max(abs(np.linalg.norm(way) - self._radius) for way in (first, second))
         if not self._radius or off > _SAME * self._radius:
             return ()
-        ways = [one + (other - one) * i / _ARC for i in range(1, _ARC)]
+        ways = [first + (second - first) * i / _ARC for i in range(1, _ARC)]
         arc = (centre + self._radius / np.linalg.norm(way) * way for way in ways)
         return self._add_places(link, *arc)
 

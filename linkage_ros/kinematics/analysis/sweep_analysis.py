@@ -95,15 +95,15 @@ def pose_alone(closure: Closure, number: int, *inputs: float) -> Callable[..., S
 
     def pose_at(*values: float) -> StepPose:
         state = closure.initial_state(*values)
-        found: StepPose = PLACED
+        pose: StepPose = PLACED
         for close, coordinates, pins in plan:
             # Steps that are left out keep their places in the lists, which nothing reads.
             state.coordinates.extend([0.0] * (coordinates - len(state.coordinates)))
             state.pins.extend([0j] * (pins - len(state.pins)))
-            found = close(state)
-            if not found.status.has_pose:
+            pose = close(state)
+            if not pose.status.has_pose:
                 break
-        return found
+        return pose
 
     return pose_at
 
@@ -190,12 +190,12 @@ class InputSweep:
         middle of a limited range lies in (−π, π].
         """
         if len(self.closure.linkage.inputs) == 1:
-            found = self.closure.input_ranges
+            ranges = self.closure.input_ranges
         else:
-            found = self.closure.keep_usual(
+            ranges = self.closure.keep_usual(
                 tuple(self._name_ends(*ends) for ends in self._search_intervals())
             )
-        return tuple(map(self._usual_range, found))
+        return tuple(map(self._usual_range, ranges))
 
     def range_about(self, value: float) -> InputRange | None:
         """Return the range in which a value lies, or None."""
@@ -270,8 +270,8 @@ class InputSweep:
     def _search_intervals(self) -> list[tuple[float, float]]:
         """Return the intervals in which every loop closes, for several inputs."""
         samples = self._samples
-        found = list(find_intervals(self.is_closed, samples)) if samples else []
-        return found if self._is_cut else through_the_end(found, samples[0], samples[-1])
+        intervals = list(find_intervals(self.is_closed, samples)) if samples else []
+        return intervals if self._is_cut else through_the_end(intervals, samples[0], samples[-1])
 
     def _name_ends(self, low: float, high: float) -> InputRange:
         """Return a range with the joints whose limits end it; the other inputs are held."""
@@ -313,11 +313,11 @@ def usual_inputs(closure: Closure) -> tuple[float, ...]:
         return pose.inputs
     if several:
         usual = (pi / 3.0,) * len(linkage.inputs)
-        turning = not any(given.slider for given in linkage.inputs)
+        turning = not any(driven.slider for driven in linkage.inputs)
         if turning and _pose_conditioning(closure, closure.position(*usual)) > _EASY:
             return usual
         return max(
-            grid_positions(closure, _MANY), key=lambda found: _pose_conditioning(closure, found[1])
+            grid_positions(closure, _MANY), key=lambda entry: _pose_conditioning(closure, entry[1])
         )[0]
     interval = InputSweep(closure).widest_range
     assert interval is not None, 'reading the file has proved that it closes somewhere'
@@ -351,14 +351,14 @@ def _values_on_grid(closure: Closure, count: int) -> list[list[float]]:
     most = _MOST_ITERATED if closure.grids else _MOST_ON_GRID
     most = most if inputs_count <= _FEW else _MOST_OF_MANY
     count = min(count, max(1, int(most ** (1.0 / inputs_count))))
-    for number, given in enumerate(closure.linkage.inputs):
-        low, high = given.limits.low, given.limits.high
-        if given.slider:
+    for number, driven in enumerate(closure.linkage.inputs):
+        low, high = driven.limits.low, driven.limits.high
+        if driven.slider:
             least, farthest = closure.slide_reach(number)
             low, high = max(low, least), min(high, farthest)
             middle, half = 0.5 * (low + high), 0.5 * (high - low)
             ways.append([middle + half * (2 * i - count) / count for i in range(count + 1)])
-        elif given.limits.is_bounded:
+        elif driven.limits.is_bounded:
             low = low if low > -inf else high - tau
             high = high if high < inf else low + tau
             ways.append([low + (high - low) * i / count for i in range(count + 1)])
@@ -374,18 +374,18 @@ def follow_grid(closure: Closure) -> list[tuple[tuple[float, ...], Position]]:
     Where links only close together an open state takes long: the steps end there. Of many inputs
     the grid reaches a part of the way to limits of angles: little closes in those corners.
     """
-    ways, given = _values_on_grid(closure, _GRID), closure.linkage.inputs
+    ways, inputs_driven = _values_on_grid(closure, _GRID), closure.linkage.inputs
     home = closure.linkage.pose.inputs
-    turns = [not (one.slider or one.limits.is_bounded) for one in given]
+    turns = [not (driven.slider or driven.limits.is_bounded) for driven in inputs_driven]
     for k, at in enumerate(home if len(ways) > _FEW else ()):
-        if given[k].limits.is_bounded and not given[k].slider:
+        if inputs_driven[k].limits.is_bounded and not inputs_driven[k].slider:
             ways[k] = [at + _PART * (x - at) for x in ways[k]]
     around = [
         [bisect_left(values, at % tau if turning else at) - k for k in (1, 0)]
         for values, at, turning in zip(ways, home, turns, strict=True)
     ]
     waiting, seen = [*product(*around)], set[tuple[int, ...]]()
-    found: dict[tuple[int, ...], tuple[tuple[float, ...], Position]] = {}
+    states: dict[tuple[int, ...], tuple[tuple[float, ...], Position]] = {}
     while waiting:
         index = tuple(
             k % len(values) if turning else min(max(k, 0), len(values) - 1)
@@ -398,10 +398,10 @@ def follow_grid(closure: Closure) -> list[tuple[tuple[float, ...], Position]]:
         inputs = tuple(map(getitem, ways, index))
         position = closure.close_unlimited(*inputs)
         if position.status.has_pose:
-            found[index] = inputs, position
+            states[index] = inputs, position
             for axis, by in product(range(len(index)), (-1, 1)):
                 waiting.append(tuple(k + by * (i == axis) for i, k in enumerate(index)))
-    return [found[index] for index in sorted(found)]
+    return [states[index] for index in sorted(states)]
 
 
 def find_extremes(function: Callable[[float], float], ranges: Sequence[InputRange]) -> SweptCurve:
@@ -419,14 +419,14 @@ def find_extremes(function: Callable[[float], float], ranges: Sequence[InputRang
 
 def _min_max_curve(function: Callable[[float], float], sampled: Sequence[Sampled]) -> SweptCurve:
     lowest = _find_lowest(function, sampled)
-    upside_down = [one._replace(results=[-y for y in one.results]) for one in sampled]
+    upside_down = [sample._replace(results=[-y for y in sample.results]) for sample in sampled]
     highest = _find_lowest(lambda value: -function(value), upside_down)
     return SweptCurve(lowest, Extreme(-highest.value, highest.at))
 
 
 def _find_lowest(function: Callable[[float], float], sampled: Sequence[Sampled]) -> Extreme:
-    found: list[tuple[float, float]] = []
-    best = min((y for one in sampled for y in one.results if isfinite(y)), default=nan)
+    lows: list[tuple[float, float]] = []
+    best = min((y for sample in sampled for y in sample.results if isfinite(y)), default=nan)
     for interval, values, results in sampled:
         last = len(values) - 1
         for i, result in enumerate(results):
@@ -438,19 +438,19 @@ def _find_lowest(function: Callable[[float], float], sampled: Sequence[Sampled])
                 results[i - 1 if i or turn else 0],
                 results[(i + 1) % last if turn else min(i + 1, last)],
             )
-            found.append((result, values[i]))
+            lows.append((result, values[i]))
             # A valley much higher than the deepest cannot reach it, even with a kink.
             deep = result - best <= _DEEPER * (max(beside) - result) + _SAME
             if deep and result <= min(beside) and result < max(beside) - _NOISE:
                 lowest = golden_section(function, before, after)
                 # The place of a smooth valley has half the digits; the sample may be better.
                 if result - lowest[0] > _NOISE:
-                    found[-1] = lowest
-    found = [(result, value) for result, value in found if isfinite(result)]
-    if not found:
+                    lows[-1] = lowest
+    lows = [(result, value) for result, value in lows if isfinite(result)]
+    if not lows:
         return Extreme(nan, ())
-    best = min(result for result, _ in found)
-    places = sorted(value for result, value in found if result - best <= _SAME)
+    best = min(result for result, _ in lows)
+    places = sorted(value for result, value in lows if result - best <= _SAME)
     if len(places) > _MANY:
         return Extreme(best, ())
     at: list[float] = []
@@ -467,7 +467,7 @@ def find_zeros(function: Callable[[float], float], ranges: Sequence[InputRange])
 
     Values within the rounding errors of a chain of dyads count as 0.
     """
-    found = []
+    zeros = []
     for interval in ranges:
         values = sample_inputs(interval)
         results = [function(value) for value in values]
@@ -481,8 +481,8 @@ def find_zeros(function: Callable[[float], float], ranges: Sequence[InputRange])
             if results[i] <= min(results[i - 1], results[i + 1]) and results[i] < _NEAR_ZERO:
                 lowest, at = golden_section(function, values[i - 1], values[i + 1])
                 if min(lowest, results[i]) < _ZERO:
-                    found.append(at if lowest <= results[i] else values[i])
-    return found
+                    zeros.append(at if lowest <= results[i] else values[i])
+    return zeros
 
 
 def transmission_angles(sweep: InputSweep) -> dict[int, SweptCurve]:
@@ -588,11 +588,13 @@ def check_turns(closure: Closure) -> None:
         if not isinstance(step, FollowerJoint) or step.middle is None:
             continue
         for interval in closure.closing_ranges:
-            found = [closure.close_unlimited(value) for value in sample_inputs(interval)]
-            states = [one.state.coordinates for one in found if one.status.has_pose]
+            positions = [closure.close_unlimited(value) for value in sample_inputs(interval)]
+            states = [
+                position.state.coordinates for position in positions if position.status.has_pose
+            ]
             followed = [x[step.one] - x[step.other] + step.constant - step.middle for x in states]
             turned = [remainder(value, tau) for value in followed]
-            if any(abs(one - other) > pi for one, other in pairwise(turned)):
+            if any(abs(first - second) > pi for first, second in pairwise(turned)):
                 of = closure.linkage.ratios[step.joint].of
                 raise DefinitionError(
                     f'ratios.{step.joint}.of',
@@ -669,9 +671,9 @@ def _joint_range(
     closure: Closure, ranges: Iterable[InputRange], bound: Bound
 ) -> tuple[float, float]:
     """Return the range of a published joint, with the turns that bring it nearest its limits."""
-    values = [value for one in ranges for value in sample_inputs(one)]
-    found = [closure.position(value).joints for value in values]
-    turned = [bound.turn_to_middle(joints[bound.number]) for joints in found if joints]
+    values = [value for interval in ranges for value in sample_inputs(interval)]
+    positions = [closure.position(value).joints for value in values]
+    turned = [bound.turn_to_middle(joints[bound.number]) for joints in positions if joints]
     return min(turned), max(turned)
 
 
@@ -688,5 +690,5 @@ def _limits_text(closure: Closure, bound: Bound) -> str:
 
 
 def _joint_unit(linkage: Linkage, bound: Bound) -> str:
-    driven = {given.joint: given.unit for given in linkage.inputs}
+    driven = {driven.joint: driven.unit for driven in linkage.inputs}
     return driven.get(bound.name) or linkage.joints[bound.name].unit

@@ -47,21 +47,21 @@ def find_worst_states(closure: Closure) -> WorstStates | None:
             return [[], []]
         margins = step_margins(closure, position) if several else ()
         errors = closure.closing_errors(position)
-        return [[0.0, *errors], [1.0, *(each.conditioning for each in margins)]]
+        return [[0.0, *errors], [1.0, *(margin.conditioning for margin in margins)]]
 
-    found = []
+    states = []
     for inputs, (errors, margins) in _measured_states(closure, measure):
         if errors:
-            found.append((max(map(abs, errors)), round(min(margins), 9), inputs))
-    if not found:
+            states.append((max(map(abs, errors)), round(min(margins), 9), inputs))
+    if not states:
         return None
-    residual, _, at = max(found, key=itemgetter(0, 2))
+    residual, _, at = max(states, key=itemgetter(0, 2))
     if not several:
-        return WorstStates(residual, at, len(found), None, ())
+        return WorstStates(residual, at, len(states), None, ())
     # Symmetrical linkages have several: the first, whatever the last digits are.
-    nearest = min(found, key=itemgetter(1))[2]
+    nearest = min(states, key=itemgetter(1))[2]
     margin = closure.singularity_margin(closure.close_unlimited(*nearest))
-    return WorstStates(residual, at, len(found), margin, nearest)
+    return WorstStates(residual, at, len(states), margin, nearest)
 
 
 def _measured_states(

@@ -68,7 +68,7 @@ class Compiled:
 
     ``derivatives``: 0 for positions, 1 for velocities too, 2 for accelerations too. If
     ``within_limits``, a state with a joint beyond its limits has the status limited.
-    ``given_count`` numbers beside the motion are given to ``wanted``.
+    ``given_count`` numbers and the motion are given to ``wanted``.
     """
 
     def __init__(
@@ -178,16 +178,16 @@ def _trial_states(closure: Closure) -> Iterator[tuple[float, ...]]:
     if linkage.pose is not None:
         yield linkage.pose.inputs
     count = _TRIED_ITERATED if is_iterated(closure) else _TRIED
-    each = max(2, round(count ** (1.0 / len(linkage.inputs))))
+    steps = max(2, round(count ** (1.0 / len(linkage.inputs))))
     ways = []
-    for given in linkage.inputs:
-        low, high = given.limits.low, given.limits.high
-        if given.slider:
+    for driven in linkage.inputs:
+        low, high = driven.limits.low, driven.limits.high
+        if driven.slider:
             far = 4.0 * closure.scale
             low, high = max(low, -far), min(high, far)
         else:
             low = low if low > -inf else (high - tau if high < inf else 0.0)
             high = high if high < inf else low + tau
         # Not at the middle or an end, where links may be collinear.
-        ways.append([low + (high - low) * (i + 1.0 / pi) / each for i in range(each)])
+        ways.append([low + (high - low) * (i + 1.0 / pi) / steps for i in range(steps)])
     yield from islice(product(*ways), count)

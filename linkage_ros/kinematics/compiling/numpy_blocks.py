@@ -103,10 +103,10 @@ _BY_TANGENT = _tangent_is_close()
 
 
 class ArrayForm:
-    """Rewrites the operations of a path; ``given`` has the rates and accelerations of 0 or 1."""
+    """Rewrites the operations of a path; ``kinds`` has the rates and accelerations of 0 or 1."""
 
-    def __init__(self, given: Mapping[str, int]) -> None:
-        self._given = given
+    def __init__(self, kinds: Mapping[str, int]) -> None:
+        self._given = kinds
         self._known: dict[tuple[Any, ...], Operation] = {}
         self._bounds: dict[Operation, BlockBounds] = {}
         self._written: dict[Operation, Number] = {}
@@ -139,21 +139,21 @@ class ArrayForm:
                 return True if first else second
         return self._new_operation('or', one, other)
 
-    def where(self, condition: Number, one: Number, other: Number) -> Number:
-        """Return ``one`` if a condition holds, otherwise ``other``."""
+    def where(self, condition: Number, first: Number, second: Number) -> Number:
+        """Return ``first`` if a condition holds, otherwise ``second``."""
         if _is_constant(condition):
-            return one if condition else other
-        if one is other:
-            return one
+            return first if condition else second
+        if first is second:
+            return first
         greater = condition.name in ('>', '>=')
         if greater or condition.name in ('<', '<='):
-            if condition.arguments == (one, other):
-                return self._new_operation('maximum' if greater else 'minimum', one, other)
-            if condition.arguments == (other, one):
-                return self._new_operation('minimum' if greater else 'maximum', one, other)
-        (low, high), (other_low, other_high) = self._bounds_of(one), self._bounds_of(other)
+            if condition.arguments == (first, second):
+                return self._new_operation('maximum' if greater else 'minimum', first, second)
+            if condition.arguments == (second, first):
+                return self._new_operation('minimum' if greater else 'maximum', first, second)
+        (low, high), (other_low, other_high) = self._bounds_of(first), self._bounds_of(second)
         return self._new_operation(
-            'where', condition, one, other,
+            'where', condition, first, second,
             bounds=BlockBounds(min(low, other_low), max(high, other_high)),
         )  # fmt: skip
 
@@ -162,33 +162,35 @@ class ArrayForm:
         if operation.is_input:
             known = self._given.get(name)
             return self._new_operation(name) if known is None else known
-        given = [self._written[a] if isinstance(a, Operation) else a for a in operation.arguments]
+        numbers = [
+            self._written[a] if isinstance(a, Operation) else a for a in operation.arguments
+        ]
         match name:
             case '+':
-                return self._add(*given)
+                return self._add(*numbers)
             case '-':
-                return self._subtract(*given)
+                return self._subtract(*numbers)
             case '*':
-                return self._multiply(*given)
+                return self._multiply(*numbers)
             case '/':
-                return self._divide(*given)
+                return self._divide(*numbers)
             case '**':
-                return self._power(*given)
+                return self._power(*numbers)
             case 'negative':
-                return self._negate(*given)
+                return self._negate(*numbers)
             case 'sin' | 'cos':
-                return self._sine_cosine(*given)[name == 'cos']
+                return self._sine_cosine(*numbers)[name == 'cos']
             case 'where':
-                return self.where(*given)
+                return self.where(*numbers)
             case 'abs':
-                return self._absolute_value(*given)
+                return self._absolute_value(*numbers)
             case 'sqrt':
-                return self._square_root(*given)
+                return self._square_root(*numbers)
             case 'remainder':
-                return self._remainder(*given)
+                return self._remainder(*numbers)
         if name in _COMPARED:
-            return self._compare(name, *given)
-        return self._new_operation(name, *given)
+            return self._compare(name, *numbers)
+        return self._new_operation(name, *numbers)
 
     def _add(self, one: Number, other: Number) -> Number:
         if _is_constant(one) and _is_constant(other):
@@ -203,79 +205,79 @@ class ArrayForm:
             '+', *_order_pair(one, other), bounds=BlockBounds(low + other_low, high + other_high)
         )
 
-    def _subtract(self, one: Number, other: Number) -> Number:
-        if _is_constant(one) and _is_constant(other):
-            return one - other
-        if _is_constant(other) and other == 0.0:
-            return one
-        if _is_constant(one) and one == 0.0:
-            return self._negate(other)
-        if (positive := _negated_operand(other)) is not None:
-            return self._add(one, positive)
-        if (positive := _negated_operand(one)) is not None:
-            return self._negate(self._add(positive, other))
-        (low, high), (other_low, other_high) = self._bounds_of(one), self._bounds_of(other)
+    def _subtract(self, first: Number, second: Number) -> Number:
+        if _is_constant(first) and _is_constant(second):
+            return first - second
+        if _is_constant(second) and second == 0.0:
+            return first
+        if _is_constant(first) and first == 0.0:
+            return self._negate(second)
+        if (positive := _negated_operand(second)) is not None:
+            return self._add(first, positive)
+        if (positive := _negated_operand(first)) is not None:
+            return self._negate(self._add(positive, second))
+        (low, high), (other_low, other_high) = self._bounds_of(first), self._bounds_of(second)
         return self._new_operation(
-            '-', one, other, bounds=BlockBounds(low - other_high, high - other_low)
+            '-', first, second, bounds=BlockBounds(low - other_high, high - other_low)
         )
 
-    def _negate(self, one: Number) -> Number:
-        if _is_constant(one):
-            return -one
-        if one.name == '-':
-            return self._subtract(*reversed(one.arguments))
-        return self._multiply(-1.0, one)
+    def _negate(self, number: Number) -> Number:
+        if _is_constant(number):
+            return -number
+        if number.name == '-':
+            return self._subtract(*reversed(number.arguments))
+        return self._multiply(-1.0, number)
 
-    def _multiply(self, one: Number, other: Number) -> Number:
-        (factor, one), (more, other) = _split_factor(one), _split_factor(other)
+    def _multiply(self, first: Number, second: Number) -> Number:
+        (factor, first), (more, second) = _split_factor(first), _split_factor(second)
         if _is_given_zero(factor) or _is_given_zero(more):
             return 0
-        return self._scale(factor * more, self._multiply_terms(one, other))
+        return self._scale(factor * more, self._multiply_terms(first, second))
 
-    def _multiply_terms(self, one: Number, other: Number) -> Number:
-        if one is None or other is None:
-            return one if other is None else other
+    def _multiply_terms(self, first: Number, second: Number) -> Number:
+        if first is None or second is None:
+            return first if second is None else second
         bounds = _ANY
-        ends = [p * q for p in self._bounds_of(one) for q in self._bounds_of(other)]
+        ends = [p * q for p in self._bounds_of(first) for q in self._bounds_of(second)]
         if all(abs(end) < inf for end in ends):
             bounds = BlockBounds(min(ends), max(ends))
-        if one is other:
-            low, high = self._bounds_of(one)
+        if first is second:
+            low, high = self._bounds_of(first)
             bounds = bounds._replace(low=max(low, -high, 0.0) ** 2)
-        return self._new_operation('*', *_order_pair(one, other), bounds=bounds)
+        return self._new_operation('*', *_order_pair(first, second), bounds=bounds)
 
-    def _divide(self, one: Number, other: Number) -> Number:
-        (factor, one), (divisor, other) = _split_factor(one), _split_factor(other)
+    def _divide(self, first: Number, second: Number) -> Number:
+        (factor, first), (divisor, second) = _split_factor(first), _split_factor(second)
         if _is_given_zero(factor):
             return 0
         if divisor == 0.0:
             # Only in branches that the steps do not take.
             return nan
         factor /= divisor
-        if other is None:
-            return self._scale(factor, one)
-        if one is None:
-            return self._new_operation('/', factor, other)
-        return self._scale(factor, self._new_operation('/', one, other))
+        if second is None:
+            return self._scale(factor, first)
+        if first is None:
+            return self._new_operation('/', factor, second)
+        return self._scale(factor, self._new_operation('/', first, second))
 
-    def _scale(self, factor: float, one: Number) -> Number:
+    def _scale(self, factor: float, number: Number) -> Number:
         """Return a number without a constant factor, times a factor."""
-        if one is None or factor == 1.0:
-            return factor if one is None else one
-        if factor == -1.0 and one.name == '-':
-            return self._subtract(*reversed(one.arguments))
-        if one.name == '/' and _is_constant(one.arguments[0]):
-            return self._new_operation('/', factor * one.arguments[0], one.arguments[1])
-        ends = [factor * end for end in self._bounds_of(one)]
-        return self._new_operation('*', factor, one, bounds=BlockBounds(min(ends), max(ends)))
+        if number is None or factor == 1.0:
+            return factor if number is None else number
+        if factor == -1.0 and number.name == '-':
+            return self._subtract(*reversed(number.arguments))
+        if number.name == '/' and _is_constant(number.arguments[0]):
+            return self._new_operation('/', factor * number.arguments[0], number.arguments[1])
+        ends = [factor * end for end in self._bounds_of(number)]
+        return self._new_operation('*', factor, number, bounds=BlockBounds(min(ends), max(ends)))
 
-    def _power(self, one: Number, power: int) -> Number:
+    def _power(self, base: Number, power: int) -> Number:
         """Return an integer power, as products."""
         if power == 1:
-            return one
-        half = self._power(one, power // 2)
+            return base
+        half = self._power(base, power // 2)
         square = self._multiply(half, half)
-        return self._multiply(square, one) if power % 2 else square
+        return self._multiply(square, base) if power % 2 else square
 
     def _sine_cosine(self, angle: Number) -> tuple[Number, Number]:
         """
@@ -299,38 +301,38 @@ class ArrayForm:
         )
         return self._multiply(2.0, half_sine), cosine
 
-    def _absolute_value(self, one: Number) -> Number:
-        if _is_constant(one):
-            return abs(one)
-        low, high = self._bounds_of(one)
+    def _absolute_value(self, number: Number) -> Number:
+        if _is_constant(number):
+            return abs(number)
+        low, high = self._bounds_of(number)
         if low >= 0.0:
-            return one
+            return number
         if high <= 0.0:
-            return self._negate(one)
-        return self._new_operation('abs', one, bounds=BlockBounds(0.0, max(-low, high)))
+            return self._negate(number)
+        return self._new_operation('abs', number, bounds=BlockBounds(0.0, max(-low, high)))
 
-    def _square_root(self, one: Number) -> Number:
-        if not _is_constant(one) and one.name == '*' and one.arguments[0] is one.arguments[1]:
-            return self._absolute_value(one.arguments[0])
-        low, high = self._bounds_of(one)
+    def _square_root(self, base: Number) -> Number:
+        if not _is_constant(base) and base.name == '*' and base.arguments[0] is base.arguments[1]:
+            return self._absolute_value(base.arguments[0])
+        low, high = self._bounds_of(base)
         return self._new_operation(
-            'sqrt', one, bounds=BlockBounds(max(low, 0.0) ** 0.5, max(high, 0.0) ** 0.5)
+            'sqrt', base, bounds=BlockBounds(max(low, 0.0) ** 0.5, max(high, 0.0) ** 0.5)
         )
 
-    def _remainder(self, one: Number, period: Number) -> Number:
+    def _remainder(self, number: Number, period: Number) -> Number:
         """Return the distance from the nearest multiple of a period, which numpy has not."""
-        turns = self._new_operation('round', self._divide(one, period))
-        return self._subtract(one, self._multiply(period, turns))
+        turns = self._new_operation('round', self._divide(number, period))
+        return self._subtract(number, self._multiply(period, turns))
 
-    def _compare(self, name: str, one: Number, other: Number) -> Number:
-        if _is_constant(one) and _is_constant(other):
-            return _COMPARED[name](one, other)
-        (low, high), (other_low, other_high) = self._bounds_of(one), self._bounds_of(other)
+    def _compare(self, name: str, first: Number, second: Number) -> Number:
+        if _is_constant(first) and _is_constant(second):
+            return _COMPARED[name](first, second)
+        (low, high), (other_low, other_high) = self._bounds_of(first), self._bounds_of(second)
         if _is_clearly_less(high, other_low):
             return _COMPARED[name](0.0, 1.0)
         if _is_clearly_less(other_high, low):
             return _COMPARED[name](1.0, 0.0)
-        return self._new_operation(name, one, other)
+        return self._new_operation(name, first, second)
 
     def _bounds_of(self, number: Number) -> BlockBounds:
         if _is_constant(number):
@@ -377,11 +379,11 @@ def _negated_operand(number: Number) -> Number:
     return None
 
 
-def _order_pair(one: Operation, other: Operation) -> tuple[Number, Number]:
+def _order_pair(first: Operation, second: Operation) -> tuple[Number, Number]:
     """Return two terms or factors in their canonical order."""
-    if _is_constant(one) or _is_constant(other):
-        return (one, other) if _is_constant(one) else (other, one)
-    return (one, other) if one.number <= other.number else (other, one)
+    if _is_constant(first) or _is_constant(second):
+        return (first, second) if _is_constant(first) else (second, first)
+    return (first, second) if first.number <= second.number else (second, first)
 
 
 def _is_clearly_less(less: float, more: float) -> bool:
@@ -413,7 +415,7 @@ class BlockFunction:
             ([f'r{k}' for k in range(self.rows)], 'rows'),
             ([f'm{k}' for k in range(self.masks)], 'masks'),
         ]
-        head = [f'{", ".join(each)}, = {of}' for each, of in names if each]
+        head = [f'{", ".join(group)}, = {of}' for group, of in names if group]
         lines = '\n'.join(f'    {line}' for line in (*head, *writer.lines))
         self.source = f'def run(given, out, rows, masks):\n{lines}\n'  # The source of the function
         functions = (*_FUNCTIONS.values(), np.copyto, np.count_nonzero)
@@ -423,7 +425,7 @@ class BlockFunction:
         self._run = define_function(self.source, 'run', namespace)
 
     def __call__(
-        self, given: Sequence[Array | float], out: Sequence[Array], rows: Array, masks: Mask
+        self, inputs: Sequence[Array | float], out: Sequence[Array], rows: Array, masks: Mask
     ) -> Mask | None:
         """
         Compute the numbers of a block; return where the condition holds, None if it always does.
@@ -432,7 +434,7 @@ class BlockFunction:
         hold, and nothing is written if it holds for less than half of the states. ``rows`` and
         ``masks`` are scratch arrays, as long as the block; the result is one of the masks.
         """
-        holds: Mask | None = self._run(given, out, rows, masks)
+        holds: Mask | None = self._run(inputs, out, rows, masks)
         return holds
 
 
@@ -557,14 +559,14 @@ class _BlockWriter:
 
     def _write_choice(self, operation: Operation, texts: Sequence[str]) -> None:
         """Write a choice: one number over the other where a condition holds."""
-        condition, one, other = texts
+        condition, first, second = texts
         last = operation.arguments[2]
-        if self._left.get(last) == 1 and operation not in self._wanted and other[0] == 'r':
+        if self._left.get(last) == 1 and operation not in self._wanted and second[0] == 'r':
             # This is the last use of the other number: it is overwritten in place.
-            into = self._names[operation] = other
+            into = self._names[operation] = second
             self._left[last] += 1
         else:
             into = self._result_buffer(operation)
-            self.lines.append(f'copyto({into}, {other})')
-        self.lines.append(f'copyto({into}, {one}, where={condition})')
+            self.lines.append(f'copyto({into}, {second})')
+        self.lines.append(f'copyto({into}, {first}, where={condition})')
         self._done_with(operation.operands())

@@ -57,7 +57,7 @@ def python_source(path: Path) -> tuple[str, dict[str, Any]]:
     """
     lines, outputs, bound = python_body(path, 'return None')
     groups = [f'({", ".join(group)},)' if group else '()' for group in outputs]
-    parameters = ', '.join(given.name for given in path.inputs)
+    parameters = ', '.join(driven.name for driven in path.inputs)
     text = [f'def solve({parameters}):', *(f'    {line}' for line in lines)]
     returned = f'{", ".join(groups)},' if groups else '()'
     return '\n'.join([*text, f'    return {returned}', '']), bound
@@ -110,16 +110,16 @@ def python_body(path: Path, bail_out: str, prefix: str = 'k') -> PythonBody:
         [*conditions, *outputs],
         write_constant,
         write_call,
-        lambda condition, one, other: f'{one} if {condition} else {other}',
+        lambda condition, first, second: f'{first} if {condition} else {second}',
         lambda known, text, _: f'{known} = {text}',
     )
-    for given in path.inputs:
-        writer.name_operation(given, given.name)
+    for driven in path.inputs:
+        writer.name_operation(driven, driven.name)
     if any(map(_of_inputs, conditions)):
         # 0 for finite numbers, otherwise NaN; a sum that overflows leaves the path, too, and so
         # do huge rates, whose squares might.
         large = f'{2.0**512 / HUGE * 2.0**512!r} * '
-        names = [given.name for given in path.inputs]
+        names = [driven.name for driven in path.inputs]
         total = ' + '.join(name if name[0] == 'q' else large + name for name in names)
         writer.lines += [f'total = {total}', 'if total - total != 0.0:', f'    {bail_out}']
     for condition, held in path.decisions:
@@ -139,7 +139,7 @@ def python_function(path: Path) -> Callable[..., Values | None]:
 
 def _of_inputs(condition: Operation) -> bool:
     """Return whether a condition says that inputs are finite numbers."""
-    return condition.name == 'finite' and all(one.is_input for one in condition.operands())
+    return condition.name == 'finite' and all(operand.is_input for operand in condition.operands())
 
 
 def _bracket_text(text: str) -> str:
@@ -156,7 +156,7 @@ def compile_line(
     where it decides otherwise than at ``values``. These are real or complex as in all later calls.
     """
     tape = Tape()
-    given = [tape.add_input(f'x{i}', value) for i, value in enumerate(values)]
-    results = tuple(number_of(number) for number in function(*given))
-    inputs = tuple(one.operation for one in given)
+    symbols = [tape.add_input(f'x{i}', value) for i, value in enumerate(values)]
+    results = tuple(number_of(number) for number in function(*symbols))
+    inputs = tuple(symbol.operation for symbol in symbols)
     return python_function(Path(inputs, tuple(tape.decisions), (results,), tape))

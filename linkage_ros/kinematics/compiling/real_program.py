@@ -76,7 +76,7 @@ def lower_path(
     lengths below 1e-154 are lost, and so is the sign of a zero.
     """
     lower = Lowering(by_squares)
-    inputs = tuple(lower.lower_operation(given) for given in path.inputs)
+    inputs = tuple(lower.lower_operation(driven) for driven in path.inputs)
     decisions = tuple(
         Decision(lower.lower_operation(condition), held) for condition, held in path.decisions
     )
@@ -129,47 +129,50 @@ class Lowering:
         name = operation.name
         if operation.is_input:
             return self.tape.add_input(name, operation.value)
-        given: list[Any] = [
+        arguments: list[Any] = [
             self._known.get(a) if isinstance(a, Operation) else self._lower_number(a)
             for a in operation.arguments
         ]
         if name == 'call':
-            function, *numbers = given
+            function, *numbers = arguments
             return self.tape.call(function, *numbers)
         if name == 'item':
             # As text: the number could get the name of an equal length.
-            return self.tape.write(name, given[0], str(given[1]))
-        if not any(isinstance(one, _Parts) for one in given) and name not in _MAKES_PARTS:
-            return self.tape.write(name, *given)
-        return self._formulas[name](self, *given)
+            return self.tape.write(name, arguments[0], str(arguments[1]))
+        if (
+            not any(isinstance(argument, _Parts) for argument in arguments)
+            and name not in _MAKES_PARTS
+        ):
+            return self.tape.write(name, *arguments)
+        return self._formulas[name](self, *arguments)
 
 
-def _short_product(one: Any, other: Any) -> Any:
+def _short_product(first: Any, second: Any) -> Any:
     """Return a product; 0 if one factor is a constant 0."""
-    if not _are_constants(one, other) and (_is_zero(one) or _is_zero(other)):
+    if not _are_constants(first, second) and (_is_zero(first) or _is_zero(second)):
         return 0.0
-    return one * other
+    return first * second
 
 
 def _is_zero(number: Any) -> bool:
     return isinstance(number, int | float) and number == 0.0
 
 
-def _are_constants(one: Any, other: Any) -> bool:
+def _are_constants(first: Any, second: Any) -> bool:
     """Return whether both are constants; then a zero has its correct sign too."""
-    return isinstance(one, int | float) and isinstance(other, int | float)
+    return isinstance(first, int | float) and isinstance(second, int | float)
 
 
-def _short_sum(one: Any, other: Any) -> Any:
-    if _are_constants(one, other):
-        return one + other
-    return other if _is_zero(one) else one if _is_zero(other) else one + other
+def _short_sum(first: Any, second: Any) -> Any:
+    if _are_constants(first, second):
+        return first + second
+    return second if _is_zero(first) else first if _is_zero(second) else first + second
 
 
-def _short_difference(one: Any, other: Any) -> Any:
-    if _are_constants(one, other):
-        return one - other
-    return -other if _is_zero(one) else one if _is_zero(other) else one - other
+def _short_difference(first: Any, second: Any) -> Any:
+    if _are_constants(first, second):
+        return first - second
+    return -second if _is_zero(first) else first if _is_zero(second) else first - second
 
 
 _EXACT = (operator.mul, operator.add, operator.sub)
@@ -181,18 +184,18 @@ def _to_parts(number: Any) -> _Parts:
     return number if isinstance(number, _Parts) else _Parts(number, 0.0)
 
 
-def _add_parts(lower: Lowering, one: Any, other: Any) -> _Parts:
-    a, b = _to_parts(one), _to_parts(other)
+def _add_parts(lower: Lowering, first: Any, second: Any) -> _Parts:
+    a, b = _to_parts(first), _to_parts(second)
     return _Parts(lower.plus(a.x, b.x), lower.plus(a.y, b.y))
 
 
-def _subtract_parts(lower: Lowering, one: Any, other: Any) -> _Parts:
-    a, b = _to_parts(one), _to_parts(other)
+def _subtract_parts(lower: Lowering, first: Any, second: Any) -> _Parts:
+    a, b = _to_parts(first), _to_parts(second)
     return _Parts(lower.minus(a.x, b.x), lower.minus(a.y, b.y))
 
 
-def _multiply_parts(lower: Lowering, one: Any, other: Any) -> _Parts:
-    a, b = _to_parts(one), _to_parts(other)
+def _multiply_parts(lower: Lowering, first: Any, second: Any) -> _Parts:
+    a, b = _to_parts(first), _to_parts(second)
     times = lower.times
     return _Parts(
         lower.minus(times(a.x, b.x), times(a.y, b.y)),
@@ -217,24 +220,24 @@ def _divide_parts(lower: Lowering, one: Any, other: Any) -> _Parts:
     return _Parts((first + second * ratio) / scale, across / scale)
 
 
-def _divide_by_squares(lower: Lowering, one: Any, other: Any) -> _Parts:
-    if isinstance(other, _Parts):
-        one = _multiply_parts(lower, one, _Parts(other.x, -other.y))
-        other = _squared_length(other)
-    a = _to_parts(one)
-    return _Parts(a.x / other, a.y / other)
+def _divide_by_squares(lower: Lowering, first: Any, second: Any) -> _Parts:
+    if isinstance(second, _Parts):
+        first = _multiply_parts(lower, first, _Parts(second.x, -second.y))
+        second = _squared_length(second)
+    a = _to_parts(first)
+    return _Parts(a.x / second, a.y / second)
 
 
-def _length_by_squares(_: Lowering, one: _Parts) -> Any:
-    return sqrt(_squared_length(one))
+def _length_by_squares(_: Lowering, vector: _Parts) -> Any:
+    return sqrt(_squared_length(vector))
 
 
-def _squared_length(one: _Parts) -> Any:
-    return _short_sum(_short_product(one.x, one.x), _short_product(one.y, one.y))
+def _squared_length(vector: _Parts) -> Any:
+    return _short_sum(_short_product(vector.x, vector.x), _short_product(vector.y, vector.y))
 
 
-def _negate_parts(_: Lowering, one: _Parts) -> _Parts:
-    return _Parts(-one.x, -one.y)
+def _negate_parts(_: Lowering, vector: _Parts) -> _Parts:
+    return _Parts(-vector.x, -vector.y)
 
 
 _FORMULAS: dict[str, Callable[..., Any]] = {
@@ -243,11 +246,11 @@ _FORMULAS: dict[str, Callable[..., Any]] = {
     '*': _multiply_parts,
     '/': _divide_parts,
     'negative': _negate_parts,
-    'conjugate': lambda _, one: _Parts(one.x, -one.y),
-    'real': lambda _, one: one.x,
-    'imag': lambda _, one: one.y,
-    'abs': lambda lower, one: lower.tape.write('hypot', one.x, one.y),
-    'phase': lambda _, one: atan2(one.y, one.x),
+    'conjugate': lambda _, vector: _Parts(vector.x, -vector.y),
+    'real': lambda _, vector: vector.x,
+    'imag': lambda _, vector: vector.y,
+    'abs': lambda lower, vector: lower.tape.write('hypot', vector.x, vector.y),
+    'phase': lambda _, vector: atan2(vector.y, vector.x),
     'facing': lambda _, angle: _Parts(cos(angle), sin(angle)),
     'vector': lambda _, x, y: _Parts(x, y),
 }
@@ -297,8 +300,8 @@ def compile_program(closure: Closure, derivatives: int, wanted: OutputSelection)
         )
     tape = Tape()
     count = len(closure.linkage.inputs)
-    given: list[Any] = [tape.add_input(one.name, one.value) for one in paths[0].inputs]
-    groups = [given[start:][:count] for start in range(0, len(given), count)]
+    symbols: list[Any] = [tape.add_input(symbol.name, symbol.value) for symbol in paths[0].inputs]
+    groups = [symbols[start:][:count] for start in range(0, len(symbols), count)]
     taken = [tuple(decision.held for decision in path.decisions) for path in paths]
     solved = 0
 
@@ -331,5 +334,5 @@ def compile_program(closure: Closure, derivatives: int, wanted: OutputSelection)
 
     tree = tree_below(tape, (), run_leaf)
     lowering = Lowering()
-    inputs = tuple(lowering.lower_operation(one.operation) for one in given)
+    inputs = tuple(lowering.lower_operation(symbol.operation) for symbol in symbols)
     return Program(inputs, lowering.lower_tree(tree))

@@ -114,14 +114,14 @@ class SolverOutline:
         given = _broadcast_values('inputs', list(inputs), driven, None)
         count = len(given[0])
         for name, values in (('rates', rates), ('accelerations', accelerations))[:derivatives]:
-            each: Any = values
+            column: Any = values
             if columns is not None and isinstance(values, np.ndarray):
-                each = columns_of(name, values) or values
+                column = columns_of(name, values) or values
             elif driven == 1:
-                each = to_doubles(name, values)
+                column = to_doubles(name, values)
             # The values of a single driven joint need no list.
-            alone = np.ndim(each) < 2 if driven == 1 else not np.iterable(each)
-            given += _broadcast_values(name, [each] if alone else list(each), driven, count)
+            alone = np.ndim(column) < 2 if driven == 1 else not np.iterable(column)
+            given += _broadcast_values(name, [column] if alone else list(column), driven, count)
         numbers: list[Any] = [value if value.ndim else float(value) for value in given]
         with np.errstate(all='ignore'):
             if _has_huge(numbers[driven:], driven):
@@ -156,10 +156,10 @@ class SolverOutline:
             self._solve_block(block, programs, self._compiled(derivatives))
         return batch
 
-    def _solve_huge(self, given: list[Array], derivatives: int, out: Batch | None) -> Batch:
+    def _solve_huge(self, columns: list[Array], derivatives: int, out: Batch | None) -> Batch:
         """Solve with scaled rates and accelerations: what overflows is infinite."""
         driven = self._driven
-        inputs, moved = given[:driven], given[driven:]
+        inputs, moved = columns[:driven], columns[driven:]
         rates, changes = moved[:driven], moved[driven:]
         huge = [_are_huge(value, k < driven) for k, value in enumerate((*rates, *changes))]
         scale = np.where(np.any(np.broadcast_arrays(*huge), axis=0), SHRINK, 1.0)
@@ -176,7 +176,7 @@ class SolverOutline:
         return batch
 
     def _solve_block(
-        self, block: _ProgramBlock, programs: Sequence[_SolveProgram], one: Compiled
+        self, block: _ProgramBlock, programs: Sequence[_SolveProgram], compiled: Compiled
     ) -> None:
         """Solve a block; states that no program covers are solved one by one."""
         left = block.mark_nonfinite(self._driven)
@@ -187,7 +187,7 @@ class SolverOutline:
         if left is None:
             left = np.arange(len(block.status))
         for k in left.tolist():
-            block.solve_state(k, self._driven, one)
+            block.solve_state(k, self._driven, compiled)
         if self._limited and (bounds := self._closure.bounds):
             beyond = bounds.are_beyond(block.given, block.values[0])
             block.status[beyond & (block.status < _LIMITED)] = _LIMITED
@@ -253,11 +253,11 @@ class _ProgramBlock(NamedTuple):
             row[states] = numbers
         return holds
 
-    def solve_state(self, k: int, driven: int, one: Compiled) -> None:
+    def solve_state(self, k: int, driven: int, compiled: Compiled) -> None:
         """Solve a single state."""
         numbers = [float(n[k]) if isinstance(n, np.ndarray) else n for n in self.given]
         # A rate that is not finite has no result, but the pose is valid.
-        answer = one(*(number if isfinite(number) else 0.0 for number in numbers))
+        answer = compiled(*(number if isfinite(number) else 0.0 for number in numbers))
         self.status[k] = CODES[answer.status]
         for order, (values, solved) in enumerate(zip(self.values, answer.values, strict=True)):
             if solved:
@@ -268,11 +268,11 @@ class _ProgramBlock(NamedTuple):
         return [n[states] if isinstance(n, np.ndarray) else n for n in self.given]
 
     def _run_function(
-        self, function: BlockFunction, given: list[Any], into: list[Any]
+        self, function: BlockFunction, numbers: list[Any], into: list[Any]
     ) -> Mask | None:
         count = len(into[0]) if into else len(self.status)
         return function(
-            given, into, self.rows[: function.rows, :count], self.masks[: function.masks, :count]
+            numbers, into, self.rows[: function.rows, :count], self.masks[: function.masks, :count]
         )
 
     def clear_invalid(self) -> None:
@@ -285,10 +285,10 @@ class _ProgramBlock(NamedTuple):
 def _array_program(path: Lowered, kinds: Sequence[Any]) -> _SolveProgram:
     """Return a path over arrays; kinds are the types of its inputs, or their constants."""
     (inputs, decisions, outputs, _), ends = path
-    names = [given.name for given in inputs]
-    each = list(zip(names, kinds, strict=True))
-    form = ArrayForm({name: kind for name, kind in each if isinstance(kind, int)})
-    arrays = [name for name, kind in each if kind is np.ndarray]
+    names = [driven.name for driven in inputs]
+    named_kinds = list(zip(names, kinds, strict=True))
+    form = ArrayForm({name: kind for name, kind in named_kinds if isinstance(kind, int)})
+    arrays = [name for name, kind in named_kinds if kind is np.ndarray]
     holds: Number = True
     lost: list[Number] = [False] * len(_LOST)
     for (condition, held), fate in zip(decisions, ends, strict=True):

@@ -47,7 +47,7 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
     'real': lambda vector: vector.real,
     'imag': lambda vector: vector.imag,
     'conjugate': lambda vector: vector.conjugate(),
-    'where': lambda condition, one, other: one if condition else other,
+    'where': lambda condition, first, second: first if condition else second,
     'item': operator.getitem,
     '<': operator.lt,
     '<=': operator.le,
@@ -56,7 +56,7 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
     '==': operator.eq,
     '!=': operator.ne,
     'finite': lambda *numbers: all(map(math.isfinite, numbers)),
-    'found': lambda found: found is not None,
+    'found': lambda result: result is not None,
 }
 
 _TRUTHS = frozenset(('<', '<=', '>', '>=', '==', '!=', 'finite', 'found'))
@@ -93,7 +93,7 @@ def rewrite_operations(
     waiting = [root]
     while waiting:
         operation = waiting[-1]
-        needed = [one for one in operation.operands() if one not in known]
+        needed = [operand for operand in operation.operands() if operand not in known]
         if needed:
             waiting += needed
             continue
@@ -150,25 +150,27 @@ class Tape:
 
     def write(self, name: str, *arguments: Any) -> Any:
         """Return the symbol of an operation on symbols and constants."""
-        given = tuple(a.operation if isinstance(a, Symbol) else a for a in arguments)
-        simple = _simplify(name, given)
+        operands = tuple(a.operation if isinstance(a, Symbol) else a for a in arguments)
+        simple = _simplify(name, operands)
         if simple is not None:
             return Symbol(self, simple) if isinstance(simple, Operation) else simple
-        if name == '+' and (back := _negated_operand(given[1])) is not None:
-            name, given = '-', (given[0], back)
-        elif name == '+' and (back := _negated_operand(given[0])) is not None:
-            name, given = '-', (given[1], back)
-        elif name == '-' and (back := _negated_operand(given[1])) is not None:
-            name, given = '+', (given[0], back)
-        elif name in ('*', '/') and (rest := _without_negation(name, given)) is not None:
+        if name == '+' and (back := _negated_operand(operands[1])) is not None:
+            name, operands = '-', (operands[0], back)
+        elif name == '+' and (back := _negated_operand(operands[0])) is not None:
+            name, operands = '-', (operands[1], back)
+        elif name == '-' and (back := _negated_operand(operands[1])) is not None:
+            name, operands = '+', (operands[0], back)
+        elif name in ('*', '/') and (rest := _without_negation(name, operands)) is not None:
             # Out of the product: a sum takes it in.
             return -self.write(name, *rest)
-        return Symbol(self, self._new_operation(name, given, _result_kind(name, given), None))
+        return Symbol(
+            self, self._new_operation(name, operands, _result_kind(name, operands), None)
+        )
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Symbol:
         """Return the symbol of a function's result; the function cannot take symbols."""
-        given = tuple(a.operation if isinstance(a, Symbol) else a for a in arguments)
-        return Symbol(self, self._new_operation('call', (function, *given), 'other', None))
+        operands = tuple(a.operation if isinstance(a, Symbol) else a for a in arguments)
+        return Symbol(self, self._new_operation('call', (function, *operands), 'other', None))
 
     def _new_operation(
         self, name: str, arguments: tuple[Any, ...], kind: Kind, value: Any
@@ -292,75 +294,76 @@ def never_minus_zero(number: Any) -> bool:
     return number.name == 'abs'
 
 
-def _simplify(name: str, given: tuple[Any, ...]) -> Any:
+def _simplify(name: str, operands: tuple[Any, ...]) -> Any:
     """Return an operation in a simpler form with the same bits, or None if there is none."""
     if name in ('+', '-', '*', '/') and not any(
-        isinstance(a, complex) or (isinstance(a, Operation) and a.kind == 'complex') for a in given
+        isinstance(a, complex) or (isinstance(a, Operation) and a.kind == 'complex')
+        for a in operands
     ):
-        one, other = given
-        if name == '-' and _is_exactly(other, 0.0):
-            return one
-        if name in ('*', '/') and _is_exactly(other, 1.0):
-            return one
-        if name == '*' and _is_exactly(one, 1.0):
-            return other
-        if name == '+' and _is_exactly(other, -0.0):
-            return one
-        if name == '+' and _is_exactly(one, 0.0) and never_minus_zero(other):
-            return other
-        if name == '+' and _is_exactly(other, 0.0) and never_minus_zero(one):
-            return one
+        first, second = operands
+        if name == '-' and _is_exactly(second, 0.0):
+            return first
+        if name in ('*', '/') and _is_exactly(second, 1.0):
+            return first
+        if name == '*' and _is_exactly(first, 1.0):
+            return second
+        if name == '+' and _is_exactly(second, -0.0):
+            return first
+        if name == '+' and _is_exactly(first, 0.0) and never_minus_zero(second):
+            return second
+        if name == '+' and _is_exactly(second, 0.0) and never_minus_zero(first):
+            return first
     if name == 'negative':
-        (one,) = given
-        return _negated_operand(one)
-    if name == 'vector' and all(isinstance(one, Operation) for one in given):
-        x, y = given
+        (first,) = operands
+        return _negated_operand(first)
+    if name == 'vector' and all(isinstance(operand, Operation) for operand in operands):
+        x, y = operands
         if (x.name, y.name, x.arguments) == ('real', 'imag', y.arguments):
             return x.arguments[0]
     if name == 'abs':
-        (one,) = given
-        if isinstance(one, Operation) and one.name == 'abs':
-            return one
+        (first,) = operands
+        if isinstance(first, Operation) and first.name == 'abs':
+            return first
     return None
 
 
-def _is_exactly(given: Any, value: float) -> bool:
+def _is_exactly(operand: Any, value: float) -> bool:
     return (
-        isinstance(given, (int, float))
-        and given == value
-        and math.copysign(1.0, given) == math.copysign(1.0, value)
+        isinstance(operand, (int, float))
+        and operand == value
+        and math.copysign(1.0, operand) == math.copysign(1.0, value)
     )
 
 
-def _negated_operand(given: Any) -> Any:
+def _negated_operand(operand: Any) -> Any:
     """Return the operand of a negation, or None."""
-    if isinstance(given, Operation) and given.name == 'negative' and given.kind == 'real':
-        return given.arguments[0]
+    if isinstance(operand, Operation) and operand.name == 'negative' and operand.kind == 'real':
+        return operand.arguments[0]
     return None
 
 
-def _without_negation(name: str, given: tuple[Any, ...]) -> tuple[Any, ...] | None:
+def _without_negation(name: str, operands: tuple[Any, ...]) -> tuple[Any, ...] | None:
     """Return what a real product or quotient is the negation of, or None."""
-    one, other = given
-    if any(isinstance(a, complex) or getattr(a, 'kind', 'real') != 'real' for a in given):
+    first, second = operands
+    if any(isinstance(a, complex) or getattr(a, 'kind', 'real') != 'real' for a in operands):
         return None
-    if (back := _negated_operand(one)) is not None:
-        return back, other
-    if (back := _negated_operand(other)) is not None:
-        return one, back
-    if name == '*' and _is_exactly(one, -1.0):
-        return 1.0, other
-    return (one, 1.0) if _is_exactly(other, -1.0) else None
+    if (back := _negated_operand(first)) is not None:
+        return back, second
+    if (back := _negated_operand(second)) is not None:
+        return first, back
+    if name == '*' and _is_exactly(first, -1.0):
+        return 1.0, second
+    return (first, 1.0) if _is_exactly(second, -1.0) else None
 
 
-def _result_kind(name: str, given: tuple[Any, ...]) -> Kind:
+def _result_kind(name: str, operands: tuple[Any, ...]) -> Kind:
     if name in _TRUTHS:
         return 'truth'
     if name in _REALS:
         return 'real'
     if name in _COMPLEX:
         return 'complex'
-    numbers = given[1:] if name == 'where' else given
+    numbers = operands[1:] if name == 'where' else operands
     if any(isinstance(a, complex) or getattr(a, 'kind', '') == 'complex' for a in numbers):
         return 'complex'
     if any(getattr(a, 'kind', '') == 'truth' for a in numbers):

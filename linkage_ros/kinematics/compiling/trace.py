@@ -37,14 +37,14 @@ class TracedMotion(NamedTuple):
 
 
 OutputSelection = Callable[..., Sequence[Sequence[float]]]
-"""Selects the numbers of a motion, and of numbers given beside it, that a program returns."""
+"""Selects the numbers of a motion, and of numbers given with it, that a program returns."""
 
 
 class Path(NamedTuple):
     """The operations of the steps while their decisions are the same."""
 
     # The values of the driven joints, then their rates and accelerations, if requested; then
-    # numbers given beside the motion.
+    # numbers given with the motion.
     inputs: tuple[Operation, ...]
     # The decisions in order. If one of them differs, the path is not valid.
     decisions: tuple[Decision, ...]
@@ -71,29 +71,29 @@ def trace_path(
     ``at`` has values of the inputs, in [rad] or [m], at which the linkage is closed; else
     ValueError is raised. ``derivatives``: 0 for positions, 1 for velocities too, 2 for
     accelerations too. If ``within_limits``, the path ends where a joint is beyond its limits.
-    ``given_count`` numbers beside the motion are given to ``wanted``.
+    ``given_count`` numbers and the motion are given to ``wanted``.
     """
     tape = Tape()
-    given = [
+    symbols = [
         [tape.add_input(f'{letter}{i}', value) for i, value in enumerate(values)]
         for letter, values in zip('qwa', (at, [1.25] * len(at), [0.75] * len(at)), strict=True)
     ][: 1 + derivatives]
     beside = [tape.add_input(f'g{i}', 0.5 + i) for i in range(given_count)]
     tape.reset_decisions()
-    motion = motion_at(closure, given, within_limits)
+    motion = motion_at(closure, symbols, within_limits)
     if motion.position.status is not Status.CLOSED:
         raise ValueError(f'{list(at)}: the linkage is {motion.position.status.value} there')
     # The selection may make decisions, too.
     outputs = tuple(tuple(number_of(n) for n in group) for group in wanted(motion, *beside))
-    inputs = tuple(symbol.operation for group in (*given, beside) for symbol in group)
+    inputs = tuple(symbol.operation for group in (*symbols, beside) for symbol in group)
     return Path(inputs, tuple(tape.decisions), outputs, tape)
 
 
 def motion_at(
-    closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool = True
+    closure: Closure, columns: Sequence[Sequence[Any]], within_limits: bool = True
 ) -> TracedMotion:
     """Return the motion of a closure at inputs, rates and accelerations, as far as given."""
-    inputs, *more = given
+    inputs, *more = columns
     position = closure.position(*inputs) if within_limits else closure.close_unlimited(*inputs)
     velocity = acceleration = None
     if more and position.status.has_rates:
@@ -142,9 +142,13 @@ def tree_below(
         condition, held = made[number]
         if condition.name == 'finite':
             continue
-        other = tree_below(tape, (*(each.held for each in made[:number]), not held), leaf)
-        if tree != other:
-            tree = DecisionBranch(condition, *((tree, other) if held else (other, tree)), held)
+        opposite = tree_below(
+            tape, (*(decision.held for decision in made[:number]), not held), leaf
+        )
+        if tree != opposite:
+            tree = DecisionBranch(
+                condition, *((tree, opposite) if held else (opposite, tree)), held
+            )
     return tree
 
 
@@ -158,7 +162,7 @@ def fallback_statuses(closure: Closure, path: Path) -> tuple[Tree, ...]:
     """
     tape = path.tape
     inputs: list[Any] = [
-        Symbol(tape, given) for given in path.inputs[: len(closure.linkage.inputs)]
+        Symbol(tape, driven) for driven in path.inputs[: len(closure.linkage.inputs)]
     ]
     tape.reset_decisions()
     known = closure.initial_state(*inputs)

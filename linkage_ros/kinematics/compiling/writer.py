@@ -135,10 +135,11 @@ class TextWriter:
         name = operation.name
         if name in _PRECEDENCE and name not in ('negative', '**'):
             precedence = _PRECEDENCE[name]
-            one, other = parts
+            first, second = parts
             # Sums and products associate to the left: the right operand needs brackets.
             return WrittenText(
-                f'{one.in_parentheses(precedence)} {name} {other.in_parentheses(precedence + 1)}',
+                f'{first.in_parentheses(precedence)} {name} '
+                f'{second.in_parentheses(precedence + 1)}',
                 precedence,
                 depth,
             )
@@ -146,15 +147,15 @@ class TextWriter:
             precedence = _PRECEDENCE[name]
             return WrittenText(f'-{parts[0].in_parentheses(precedence + 1)}', precedence, depth)
         if name in _COMPARISONS:
-            one, other = parts
+            first, second = parts
             return WrittenText(
-                f'{one.in_parentheses(4)} {name} {other.in_parentheses(4)}', 2, depth
+                f'{first.in_parentheses(4)} {name} {second.in_parentheses(4)}', 2, depth
             )
         if name == 'where':
-            condition, one, other = parts
+            condition, first, second = parts
             return WrittenText(
                 self._choice(
-                    condition.in_parentheses(2), one.in_parentheses(2), other.in_parentheses(2)
+                    condition.in_parentheses(2), first.in_parentheses(2), second.in_parentheses(2)
                 ),
                 0,
                 depth,

@@ -8,7 +8,7 @@
 """
 How much the equations of a planar group bend: bounds of their second derivatives.
 
-A pin places a link beside another one, so that the end of a link is a sum of arms, each of which
+A pin places a link next to another one, so that the end of a link is a sum of arms, each of which
 turns with one link: Σ c·e^{iθ}, plus places that are known or free. What remains of an equation is
 such a sum, or one seen from a link that turns, too.
 """
@@ -45,8 +45,8 @@ class ArmSums:
         if end.body < 0:
             return {}, set()
         if end.body in self._placed:
-            own, other = self._placed[end.body]
-            arms, free = self.arms_to(other)
+            own, known_end = self._placed[end.body]
+            arms, free = self.arms_to(known_end)
             arm = end.arm - own.arm
         else:
             arms, free, arm = {}, {end.body}, end.arm
@@ -90,16 +90,16 @@ class ArmSums:
                 bounds[_pair(turn, column)] = 2.0
         return bounds
 
-    def _arms_between(self, one: End, other: End) -> tuple[dict[int, complex], set[int]]:
-        arms, free = self.arms_to(one)
-        others, also_free = self.arms_to(other)
+    def _arms_between(self, first: End, second: End) -> tuple[dict[int, complex], set[int]]:
+        arms, free = self.arms_to(first)
+        others, also_free = self.arms_to(second)
         for body, arm in others.items():
             arms[body] = arms.get(body, 0j) - arm
         return arms, free | also_free
 
 
-def _pair(one: int, other: int) -> Pair:
-    return (one, other) if one < other else (other, one)
+def _pair(first: int, second: int) -> Pair:
+    return (first, second) if first < second else (second, first)
 
 
 def list_bounds(bounds: Mapping[Pair, Any], columns: Sequence[int]) -> list[Any]:

@@ -294,15 +294,15 @@ class Continuation:
 
     def _bends_by_input(self, cell: Cell, middle: Array, slopes: Array) -> Array | None:
         """Return how fast the derivatives change with the input, from the ends of a cell."""
-        found = np.zeros_like(slopes)
+        bends = np.zeros_like(slopes)
         for end in cell[:2]:
             beside = np.append(middle[:-1], end.place[-1])
             there, way = self.curve.evaluate(beside), float(abs(end.place[-1] - middle[-1]))
             if there is None:
                 return None
             if way:
-                found = np.maximum(found, np.abs(there[1] - slopes) / way)
-        return found
+                bends = np.maximum(bends, np.abs(there[1] - slopes) / way)
+        return bends
 
     def _proof_at(
         self, place: Array, errors: Array, slopes: Array, row: Array, bends: Array
@@ -362,10 +362,10 @@ class Continuation:
         right = np.zeros(len(place))
         right[-1] = 1.0
         try:
-            found = np.linalg.solve(np.vstack([system[1], ahead]), right)
+            tangent = np.linalg.solve(np.vstack([system[1], ahead]), right)
         except np.linalg.LinAlgError:
             return None
-        return BranchNode(place, np.asarray(found / sqrt(float(found @ found)), np.float64))
+        return BranchNode(place, np.asarray(tangent / sqrt(float(tangent @ tangent)), np.float64))
 
     def _correct_onto(self, start: Array, row: Array, goal: float) -> Array | None:
         """Return the solution at which a linear combination of the coordinates has a value."""
@@ -393,15 +393,15 @@ class Continuation:
         return None
 
 
-def is_repeated(one: LinkState | None, other: LinkState | None) -> bool:
+def is_repeated(first: LinkState | None, second: LinkState | None) -> bool:
     """Return whether the links before are in one place at two inputs, whole turns apart."""
-    if one is None or other is None:
+    if first is None or second is None:
         return False
     # That a slide differs by a whole number of turns by chance is one in 10⁹.
-    angles = [remainder(a - b, tau) for a, b in zip(one[0], other[0], strict=True)]
-    if max(map(abs, angles)) > _SAME * (1.0 + max(map(abs, one[0]))):
+    angles = [remainder(a - b, tau) for a, b in zip(first[0], second[0], strict=True)]
+    if max(map(abs, angles)) > _SAME * (1.0 + max(map(abs, first[0]))):
         return False
-    places = zip(list_numbers(one[1]), list_numbers(other[1]), strict=True)
+    places = zip(list_numbers(first[1]), list_numbers(second[1]), strict=True)
     return max((abs(a - b) for a, b in places), default=0.0) <= _SAME
 
 
@@ -526,8 +526,8 @@ class Branch:
     @property
     def gained_angles(self) -> list[float]:
         """Return the turns of the unknowns before the branch starts again, in [rad]."""
-        found: list[float] = self._gained.tolist()
-        return found
+        gained: list[float] = self._gained.tolist()
+        return gained
 
     def unwrap(self, x: float) -> tuple[int, float]:
         """Return how often the branch has started again, and the input without these turns."""
@@ -616,8 +616,8 @@ class Branch:
             last = self._x + side.sign * side.laps * tau
         else:
             last = side.sign * max(self._far, side.sign * self._x) * 2.0 ** (side.laps - 1)
-        found = list(self._continuation.follow_cells(side.node, side.sign, last))
-        cells, node = side.cells + found, found[-1].end if found else side.node
+        new_cells = list(self._continuation.follow_cells(side.node, side.sign, last))
+        cells, node = side.cells + new_cells, new_cells[-1].end if new_cells else side.node
         at = float(node.place[-1])
         end = None
         if cells and cells[-1].folds:
@@ -629,7 +629,7 @@ class Branch:
                 cells[-1] = cells[-1]._replace(folds=True)
         # Other threads read a side while it grows: whoever sees an input sees its cell.
         side.node, side.cells = node, cells
-        side.inputs = side.inputs + [side.sign * float(one.end.place[-1]) for one in found]
+        side.inputs = side.inputs + [side.sign * float(cell.end.place[-1]) for cell in new_cells]
         side.end = end
         return end is None
 

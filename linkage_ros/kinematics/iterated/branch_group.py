@@ -79,10 +79,10 @@ class BranchGroup(IteratedGroup):
         self._followed, self._system = followed, system
         self.angles: Mask = np.array(equations.angles)
         """For each unknown whether it is an angle."""
-        given, free = LinkState([before.inputs[followed.number]], []), [*equations.free]
-        self._place_line = compile_later(self._list_place, given, LinkState([*start], []))
+        input_state, free = LinkState([before.inputs[followed.number]], []), [*equations.free]
+        self._place_line = compile_later(self._list_place, input_state, LinkState([*start], []))
         values = LinkState([start[k] for k in free], [])
-        self._unknowns_line = compile_later(self._list_unknowns, given, values)
+        self._unknowns_line = compile_later(self._list_unknowns, input_state, values)
 
     # The curve, as its continuation asks for it
 
@@ -116,17 +116,17 @@ class BranchGroup(IteratedGroup):
         self, line: StraightLine, x: float, values: Sequence[float]
     ) -> list[float] | None:
         """Return the numbers of a line at an input, or None."""
-        given = LinkState([x], []), LinkState([*values], [])
-        found: list[float] | None = line(*given)
-        if found is None:
+        states = LinkState([x], []), LinkState([*values], [])
+        numbers: list[float] | None = line(*states)
+        if numbers is None:
             # The steps before may decide otherwise than in the pose.
             with suppress(UndecidedError):
-                return [*line.function(*given)]
-        return found
+                return [*line.function(*states)]
+        return numbers
 
-    def _list_place(self, given: LinkState, pose: LinkState) -> list[float]:
+    def _list_place(self, input_state: LinkState, pose: LinkState) -> list[float]:
         """Return residuals, and the rows of their derivatives."""
-        (x,) = given.coordinates
+        (x,) = input_state.coordinates
         rates = [float(k == self._followed.number) for k in range(len(self._before.inputs))]
         known, velocities = require_state(self._before.states_at(self._all_inputs(x), rates))
         errors, rows = self._equations.evaluate(known, pose.coordinates)
@@ -135,14 +135,14 @@ class BranchGroup(IteratedGroup):
         drift = self._equations.drift(motion)
         return [*errors, *(x for row, d in zip(rows, drift, strict=True) for x in (*row, d))]
 
-    def _list_unknowns(self, given: LinkState, values: LinkState) -> list[float]:
-        (x,) = given.coordinates
+    def _list_unknowns(self, input_state: LinkState, values: LinkState) -> list[float]:
+        (x,) = input_state.coordinates
         return self._equations.complete(values.coordinates, require_state(self.known_at(x)))
 
     def _all_inputs(self, x: float) -> list[float]:
-        given = [*self._before.inputs]
-        given[self._followed.number] = x
-        return given
+        inputs = [*self._before.inputs]
+        inputs[self._followed.number] = x
+        return inputs
 
     # The branch, and where Newton's method starts on it
 
@@ -170,14 +170,16 @@ class BranchGroup(IteratedGroup):
 
         def solution_at(x: float) -> Array | None:
             start = branch.find_start(x)
-            found = start.unknowns if start is not None and start.is_end else self.solution_at(x)
-            return None if found is None else found[free]
+            unknowns = (
+                start.unknowns if start is not None and start.is_end else self.solution_at(x)
+            )
+            return None if unknowns is None else unknowns[free]
 
         def converges(x: float, values: Array) -> bool:
-            found = self._numbers_at(self._unknowns_line, x, values.tolist())
-            if found is None:
+            numbers = self._numbers_at(self._unknowns_line, x, values.tolist())
+            if numbers is None:
                 return False
-            unknowns, length = np.array(found), inf
+            unknowns, length = np.array(numbers), inf
             for _ in range(2):
                 errors, jacobian = self._system_at(x, unknowns.tolist())
                 try:

@@ -32,24 +32,24 @@ def is_zero(number: Any) -> bool:
     return isinstance(number, _NUMBERS) and number == 0
 
 
-def multiply(one: Any, other: Any) -> Any:
+def multiply(first: Any, second: Any) -> Any:
     """Return a product, without an operation if a factor is 0, 1 or −1."""
-    if is_zero(one) or is_zero(other):
+    if is_zero(first) or is_zero(second):
         return 0.0
-    for factor, number in ((one, other), (other, one)):
+    for factor, number in ((first, second), (second, first)):
         if isinstance(factor, float) and abs(factor) == 1.0:
             return number if factor > 0.0 else -number
-    return one * other
+    return first * second
 
 
-def add(one: Any, other: Any) -> Any:
+def add(first: Any, second: Any) -> Any:
     """Return a sum, without an operation if a term is 0."""
-    return other if is_zero(one) else one if is_zero(other) else one + other
+    return second if is_zero(first) else first if is_zero(second) else first + second
 
 
-def subtract(one: Any, other: Any) -> Any:
+def subtract(first: Any, second: Any) -> Any:
     """Return a difference, without an operation if a term is 0."""
-    return -other if is_zero(one) else one if is_zero(other) else one - other
+    return -second if is_zero(first) else first if is_zero(second) else first - second
 
 
 class _RowOperation(NamedTuple):
@@ -60,13 +60,13 @@ class _RowOperation(NamedTuple):
     along: Any
     across: Any = None
 
-    def apply(self, one: Any, other: Any) -> tuple[Any, Any]:
+    def apply(self, first: Any, second: Any) -> tuple[Any, Any]:
         """Return the numbers of a column, in both rows, after the operation."""
         if self.across is None:
-            return one, subtract(other, multiply(self.along, one))
+            return first, subtract(second, multiply(self.along, first))
         return (
-            add(multiply(self.along, one), multiply(self.across, other)),
-            subtract(multiply(self.along, other), multiply(self.across, one)),
+            add(multiply(self.along, first), multiply(self.across, second)),
+            subtract(multiply(self.along, second), multiply(self.across, first)),
         )
 
 
@@ -112,8 +112,10 @@ class Elimination:
     def solve(self, right: Sequence[Any]) -> list[Any]:
         """Return the solution for a right side."""
         totals = list(right)
-        for each in self._operations:
-            totals[each.row], totals[each.other] = each.apply(totals[each.row], totals[each.other])
+        for operation in self._operations:
+            totals[operation.row], totals[operation.other] = operation.apply(
+                totals[operation.row], totals[operation.other]
+            )
         solution: list[Any] = [0.0] * len(totals)
         for row, column in reversed(self._pivots):
             total = totals[row]
@@ -156,19 +158,19 @@ class Elimination:
         pivot = self._rows[row][column]
         left.discard(row)
         self._pivots.append((row, column))
-        for other in sorted(left):
-            entry = self._rows[other].get(column)
+        for other_row in sorted(left):
+            entry = self._rows[other_row].get(column)
             if entry is not None:
-                self._operate(_RowOperation(row, other, multiply(entry, pivot)), column)
+                self._operate(_RowOperation(row, other_row, multiply(entry, pivot)), column)
 
     def _operate(self, operation: _RowOperation, column: int) -> None:
         """Apply a row operation that makes a column 0 in the other row."""
         self._operations.append(operation)
-        one, other = self._rows[operation.row], self._rows[operation.other]
-        for k in sorted({**one, **other}):
-            new, left = operation.apply(one.get(k, 0.0), other.get(k, 0.0))
-            for entries, entry in ((one, new), (other, left)):
-                if is_zero(entry) or (entries is other and k == column):
+        first, second = self._rows[operation.row], self._rows[operation.other]
+        for k in sorted({**first, **second}):
+            new, left = operation.apply(first.get(k, 0.0), second.get(k, 0.0))
+            for entries, entry in ((first, new), (second, left)):
+                if is_zero(entry) or (entries is second and k == column):
                     entries.pop(k, None)
                 else:
                     entries[k] = entry

@@ -115,8 +115,8 @@ class CoincidentPoints(NamedTuple):
     ) -> tuple[list[float], list[list[float]]]:
         """Return the residuals, and the rows of their derivatives by the unknowns."""
         across, along = [0.0] * len(unknowns), [0.0] * len(unknowns)
-        (one, turn), (other, back) = (end.place_and_arm(unknowns, solved) for end in self)
-        apart = one - other
+        (first, turn), (second, back) = (end.place_and_arm(unknowns, solved) for end in self)
+        apart = first - second
         if self.one.body >= 0:
             k, end = 3 * self.one.body, 3 * self.one.body + 3
             across[k:end] = -turn.imag, 1.0, 0.0
@@ -129,8 +129,8 @@ class CoincidentPoints(NamedTuple):
 
     def differentiate(self, motion: GroupMotion) -> list[float]:
         """Return the highest derivative of the residuals by time."""
-        one, other = (end.differentiate(motion)[-1] for end in self)
-        apart = subtract(one, other)
+        first, second = (end.differentiate(motion)[-1] for end in self)
+        apart = subtract(first, second)
         return [apart.real, apart.imag]
 
     def bound_change(
@@ -220,7 +220,9 @@ class OnLine(NamedTuple):
         """Return the derivatives of the point by time, in the frame of the line, from the 0th."""
         ends = (end.differentiate(motion) for end in (self.point, self.through))
         back = unit_vector(-self.line.angle(motion.unknowns, motion.solved))
-        place, velocity, *pull = ((one - other) * back for one, other in zip(*ends, strict=True))
+        place, velocity, *pull = (
+            (first - second) * back for first, second in zip(*ends, strict=True)
+        )
         turn = self.line.rate(motion.rates, motion.solved_rates)
         velocity -= make_vector(0.0, turn) * place
         if motion.solved_accelerations is None:
@@ -304,12 +306,12 @@ class Geared(NamedTuple):
         """Return the highest derivative of the residual by time."""
         return [sum(factor * of.measured_change(motion) for factor, of in self.terms)]
 
-    def bound_change(self, unknowns: Sequence[float], *given: Any) -> list[list[float]]:
+    def bound_change(self, unknowns: Sequence[float], *states: Any) -> list[list[float]]:
         """Return a bound of the change of the row; see `bound_jacobian_change`."""
         row = [0.0] * len(unknowns)
         for factor, of in self.terms:
             if isinstance(of, OnLine):
-                (own,) = of.bound_change(unknowns, *given)
+                (own,) = of.bound_change(unknowns, *states)
                 row = [a + abs(factor) * b for a, b in zip(row, own, strict=True)]
         return [row]
 
@@ -343,8 +345,8 @@ def bound_jacobian_change(
 
     ``moved`` is the largest change of each unknown, in either direction.
     """
-    given = unknowns, solved, moved
-    return [row for constraint in constraints for row in constraint.bound_change(*given)]
+    states = unknowns, solved, moved
+    return [row for constraint in constraints for row in constraint.bound_change(*states)]
 
 
 def is_meshed(constraints: Sequence[Constraint], off: Sequence[float], part: float) -> bool:
@@ -409,33 +411,33 @@ class Constraints:
         self.constraints.append(self.slides[joint.name])
 
     def _add_drives(self) -> None:
-        for i, given in enumerate(self._linkage.driven_joints):
+        for i, driven in enumerate(self._linkage.driven_joints):
             if not self._planner.has_drive(i):
                 continue
-            if given.slider in self.slides:
-                line = self.slides[given.slider]
+            if driven.slider in self.slides:
+                line = self.slides[driven.slider]
                 self.constraints.append(line._replace(slide=self._planner.drive_coordinate(i)))
-            elif given.child in self._bodies or given.parent in self._bodies:
+            elif driven.child in self._bodies or driven.parent in self._bodies:
                 child, parent = (
-                    self._body_direction(end, 0.0) for end in (given.child, given.parent)
+                    self._body_direction(end, 0.0) for end in (driven.child, driven.parent)
                 )
                 self.constraints.append(
                     Parallel(child, parent, 0.0, self._planner.drive_coordinate(i))
                 )
 
-    def _add_ratio(self, name: str, given: Ratio) -> None:
-        joints = self._linkage.joints[name], self._linkage.joints[given.of]
+    def _add_ratio(self, name: str, follower: Ratio) -> None:
+        joints = self._linkage.joints[name], self._linkage.joints[follower.of]
         slides = [isinstance(joint, SlideJoint) for joint in joints]
         # The constraint is in the unit of the joint that follows.
         unit = self._planner.scale if slides[0] else 1.0
-        ratio = given.ratio * (self._planner.scale if slides[1] else 1.0) / unit
+        ratio = follower.ratio * (self._planner.scale if slides[1] else 1.0) / unit
         # Without the turns of its links, an angle determines the other one modulo this.
-        turns = count_turns(given.ratio)
+        turns = count_turns(follower.ratio)
         period = tau if slides[1] else abs(ratio) * tau if slides[0] else tau / max(turns, 1)
         if all(slides) or not turns:
             period = 0.0
         terms = (*self._ratio_terms(joints[0], 1.0), *self._ratio_terms(joints[1], -ratio))
-        self.constraints.append(Geared(terms, -given.offset / unit, period))
+        self.constraints.append(Geared(terms, -follower.offset / unit, period))
 
     @property
     def turns(self) -> int:
@@ -447,9 +449,9 @@ class Constraints:
         """
         turns, turns_with = self._planner.ratio_turns, self._planner.turns_with
         geared = [
-            [(factor, of) for factor, of in each.terms if isinstance(of, BodyDirection)]
-            for each in self.constraints
-            if isinstance(each, Geared)
+            [(factor, of) for factor, of in constraint.terms if isinstance(of, BodyDirection)]
+            for constraint in self.constraints
+            if isinstance(constraint, Geared)
         ]
         met = Counter(chain.from_iterable({of.body for _, of in terms} for terms in geared))
         for terms in geared:

@@ -107,11 +107,13 @@ def grid_inputs(
     inputs: Sequence[Input], pose: Sequence[float], scale: float
 ) -> tuple[GridInput, ...]:
     """Return the inputs of a linkage as coordinates; lengths are in units of ``scale`` metres."""
-    found = []
-    for given, home in zip(inputs, pose, strict=True):
-        unit, limits = scale if given.slider else 1.0, given.limits
-        found.append(GridInput(home, limits.low / unit, limits.high / unit, not given.slider))
-    return tuple(found)
+    coordinates = []
+    for driven, home in zip(inputs, pose, strict=True):
+        unit, limits = scale if driven.slider else 1.0, driven.limits
+        coordinates.append(
+            GridInput(home, limits.low / unit, limits.high / unit, not driven.slider)
+        )
+    return tuple(coordinates)
 
 
 LineForms = tuple[Sequence[float], Sequence[float]]
@@ -193,7 +195,7 @@ class Grid:
         count = len(inputs)
         level = (0.0,) * len(unknowns)
         bends = (level,) * (count * (count + 1) // 2)
-        self.home = tuple(given.home for given in inputs)
+        self.home = tuple(driven.home for driven in inputs)
         """The inputs of the pose, at the centre of the first cell."""
         self._given = GridCell(self.home, tuple(unknowns), (level,) * count, bends)
         self._kept: dict[Key, _Found] = {}
@@ -226,14 +228,14 @@ class Grid:
         """Return what a call returns at each of many inputs, one a column; and where there is."""
         import numpy as np  # local import: a tick does without it
 
-        given, home = np.stack(np.broadcast_arrays(*inputs)), np.array(self.home)[:, None]
+        values, home = np.stack(np.broadcast_arrays(*inputs)), np.array(self.home)[:, None]
         count = len(self._given.numbers)
-        rows, found = np.zeros((count, given.shape[1])), np.zeros(given.shape[1], bool)
-        left = np.arange(given.shape[1])
+        rows, has_result = np.zeros((count, values.shape[1])), np.zeros(values.shape[1], bool)
+        left = np.arange(values.shape[1])
         for level, width in enumerate(self.widths):
             if not left.size:
                 break
-            ways = np.clip((given[:, left] - home) / width, -_ALL, _ALL)
+            ways = np.clip((values[:, left] - home) / width, -_ALL, _ALL)
             places, of_states = np.unique(np.rint(ways), axis=1, return_inverse=True)
             with BUILD_LOCK:
                 cells = [
@@ -243,9 +245,9 @@ class Grid:
             proven = np.array([cell is not None for cell in cells])[of_states]
             table = np.array([cell or (0.0,) * count for cell in cells]).T
             rows[:, left[proven]] = table[:, of_states[proven]]
-            found[left[proven]] = True
+            has_result[left[proven]] = True
             left = left[~proven]
-        return rows, found
+        return rows, has_result
 
     def _write_look_up(self) -> Callable[..., tuple[float, ...] | None]:
         """Return a call as a function, written for these inputs: most lie in a widest cell."""
@@ -254,12 +256,12 @@ class Grid:
             f'round(({name} - {home!r}) / {self.widths[0]!r})'
             for name, home in zip(names, self.home, strict=True)
         ]
-        given = ', '.join(names)
+        parameters = ', '.join(names)
         lines = (
-            f'def look_up({given}):',
+            f'def look_up({parameters}):',
             f'    found = get((0, {", ".join(places)}))',
             '    if found is None or found.numbers is None:',
-            f'        return search({given})',
+            f'        return search({parameters})',
             '    return found.numbers',
         )
         bound = {'get': self._kept.get, 'search': self._search}
@@ -270,15 +272,15 @@ class Grid:
         may_close = False
         for level in range(_LEVELS):
             key = self._key_of(level, inputs)
-            found = self._kept.get(key)
-            if found is None:
+            cell = self._kept.get(key)
+            if cell is None:
                 may_close = may_close or not self._group.shortfall(inputs)
                 if not may_close:
                     return None
                 with BUILD_LOCK:
-                    found = self._follow(key)
-            if found.numbers is not None:
-                return found.numbers
+                    cell = self._follow(key)
+            if cell.numbers is not None:
+                return cell.numbers
         return None
 
     def look_ahead(self, inputs: Sequence[float], rates: Sequence[float]) -> None:
@@ -286,8 +288,8 @@ class Grid:
         turned, _ = self.turn_back(inputs)
         keys = (self._key_of(level, turned) for level in range(_LEVELS))
         for key in keys:
-            found = self._kept.get(key)
-            if found is not None and found.numbers is not None:
+            cell = self._kept.get(key)
+            if cell is not None and cell.numbers is not None:
                 break
         else:
             return
@@ -306,10 +308,10 @@ class Grid:
     def find_start(self, inputs: Sequence[Any]) -> list[Any] | None:
         """Return where Newton's method starts, with symbols too; None if no cell is there."""
         turned, gains = self.turn_back(inputs)
-        found = call(self, *turned)
-        if not has_result(found):
+        numbers = call(self, *turned)
+        if not has_result(numbers):
             return None
-        values = _predict(found, turned, len(self._given.unknowns))
+        values = _predict(numbers, turned, len(self._given.unknowns))
         return [value + gain if gain else value for value, gain in zip(values, gains, strict=True)]
 
     def turn_back(self, inputs: Sequence[Any]) -> tuple[list[Any], list[Any]]:
@@ -332,20 +334,20 @@ class Grid:
     @BuiltProperty
     def _gained_in_turns(self) -> list[tuple[float, ...] | None]:
         """Return for each input what the unknowns gain in a turn; None if it does not return."""
-        found: list[tuple[float, ...] | None] = []
-        for k, given in enumerate(self._inputs):
+        gains: list[tuple[float, ...] | None] = []
+        for k, driven in enumerate(self._inputs):
             later = tuple(x + tau * (i == k) for i, x in enumerate(self.home))
-            end, left = self.reach(later) if given.turns else (self._start, 1.0)
+            end, left = self.reach(later) if driven.turns else (self._start, 1.0)
             moved = [b - a for a, b in zip(self._start.unknowns, end.unknowns, strict=True)]
-            gained = tuple(tau * round(each / tau) for each in moved)
+            gained = tuple(tau * round(change / tau) for change in moved)
             returns = all(abs(a - b) < _RETURNED for a, b in zip(moved, gained, strict=True))
-            found.append(gained if returns and not left else None)
-        return found
+            gains.append(gained if returns and not left else None)
+        return gains
 
     @property
     def is_filled_at_once(self) -> bool:
         """Whether the cells are so few that all are made before the first state."""
-        bounded = all(isfinite(given.low) and isfinite(given.high) for given in self._inputs)
+        bounded = all(isfinite(driven.low) and isfinite(driven.high) for driven in self._inputs)
         return bounded and len(self._inputs) <= _AT_ONCE
 
     def fill(self, most: int) -> dict[Key, tuple[float, ...]] | None:
@@ -393,9 +395,9 @@ class Grid:
     def _limits_to_fill(self) -> Iterator[tuple[float, float]]:
         """Yield the limits of each input; half a turn about the pose if the links are back."""
         farthest = _FARTHEST * self.widths[0]
-        for given, gained in zip(self._inputs, self._gained_in_turns, strict=True):
+        for driven, gained in zip(self._inputs, self._gained_in_turns, strict=True):
             reach = farthest if gained is None else pi
-            yield max(given.low, given.home - reach), min(given.high, given.home + reach)
+            yield max(driven.low, driven.home - reach), min(driven.high, driven.home + reach)
 
     def _keys_between(self, level: int, limits: Sequence[tuple[float, float]]) -> list[range]:
         """Return for each input the places of the cells between two values."""
@@ -460,43 +462,43 @@ class Grid:
                 part = min(1.0, done + step)
                 end = _part_of_way(last.inputs, inputs, part)
                 predict = partial(_predict_along, place.unknowns, forms, part - done)
-                found = self._prove_step(place.inputs, end, predict)
-                if found is None:
+                solution = self._prove_step(place.inputs, end, predict)
+                if solution is None:
                     step *= 0.5
                 else:
-                    place, done, step = GridPlace(end, found), part, min(longest, 2.0 * step)
+                    place, done, step = GridPlace(end, solution), part, min(longest, 2.0 * step)
                     forms = along(*place, way)
         return place, max(abs(a - b) for a, b in zip(place.inputs, inputs, strict=True))
 
     def _follow(self, key: Key) -> _Found:
         """Return a cell, made from its neighbour on the straight line to the pose."""
-        found = self._kept.get(key)
-        if found is not None:
-            return found
-        found = self._ways.get(key)
-        if found is not None and found.cell is None:
-            return found
+        kept = self._kept.get(key)
+        if kept is not None:
+            return kept
+        kept = self._ways.get(key)
+        if kept is not None and kept.cell is None:
+            return kept
         level, *places = key
         count = max(map(abs, places), default=0)
-        found = _Found(self._start, self._start, None)
+        kept = _Found(self._start, self._start, None)
         if count > _FARTHEST << level:
-            return found._replace(cell=None)
+            return kept._replace(cell=None)
         way: list[Key] = []
         for left in range(count, 0, -1):
             places = [round(k * (left - 1) / left) for k in places]
             before = (level, *places)
             passed = self._ways.get(before)
             if passed is not None:
-                found = passed
+                kept = passed
                 break
             way.append(before)
         for before in reversed(way):
-            if found.cell is None:
+            if kept.cell is None:
                 break
-            found = self._pass_cell(before, found.cell)
-        if found.cell is None:
-            return self._remember_way(key, found)
-        return self._keep_cell(key, found.cell)
+            kept = self._pass_cell(before, kept.cell)
+        if kept.cell is None:
+            return self._remember_way(key, kept)
+        return self._keep_cell(key, kept.cell)
 
     def _pass_cell(self, key: Key, before: GridCell) -> _Found:
         """
@@ -506,18 +508,18 @@ class Grid:
         a state was in it, or kept as not proven, changes nothing.
         """
         wider = self._wider_cell(key)
-        found = self._kept.get(key)
+        kept = self._kept.get(key)
         if wider is not None:
-            found = _Found(wider, wider, None)
-        elif found is None:
-            found = self._keep_cell(key, before)
-        return self._remember_way(key, found)
+            kept = _Found(wider, wider, None)
+        elif kept is None:
+            kept = self._keep_cell(key, before)
+        return self._remember_way(key, kept)
 
-    def _remember_way(self, key: Key, found: _Found) -> _Found:
+    def _remember_way(self, key: Key, way: _Found) -> _Found:
         if len(self._ways) >= _WAYS:
             self._ways.clear()
-        self._ways[key] = found
-        return found
+        self._ways[key] = way
+        return way
 
     def _wider_cell(self, key: Key) -> GridCell | None:
         """Return the widest proven cell, of wider ones, at the centre of a cell."""
@@ -532,22 +534,22 @@ class Grid:
     def _keep_cell(self, key: Key, before: GridCell) -> _Found:
         """Return a cell that a neighbour leads to, and keep it."""
         cell = self._make_cell(key, before)
-        found = _Found(cell, cell or before, cell.numbers if cell else None)
+        kept = _Found(cell, cell or before, cell.numbers if cell else None)
         tell_progress('cells of links that close only together made', len(self._kept))
         if len(self._kept) >= self.most_cells:
             del self._kept[next(iter(self._kept))]
-        self._kept[key] = found
-        return found
+        self._kept[key] = kept
+        return kept
 
     def _make_cell(self, key: Key, known: GridCell) -> GridCell | None:
         """Return a cell, if it is proven from a known one."""
         width, centre = self.widths[key[0]], self._centre(key)
-        found = self._step_to(known, centre)
-        if found is None:
+        solution = self._step_to(known, centre)
+        if solution is None:
             return None
         # The last digits of functions differ from machine to machine.
-        forms = (tuple(map(_round_binary, each)) for each in (found.slopes, found.bends))
-        cell = GridCell(found.inputs, _round_binary(found.unknowns), *forms)
+        forms = (tuple(map(_round_binary, form)) for form in (solution.slopes, solution.bends))
+        cell = GridCell(solution.inputs, _round_binary(solution.unknowns), *forms)
         for corner in self._corners:
             at = [c + part * width for c, part in zip(centre, corner, strict=True)]
             if not self._group.proof(at, self.predict(cell, at)) <= _PROVEN:
@@ -564,7 +566,7 @@ class Grid:
         forms = None if unknowns is None else self._group.forms_at(inputs, unknowns)
         if unknowns is None or forms is None:
             return None
-        slopes, bends = (tuple(map(tuple, each)) for each in forms)
+        slopes, bends = (tuple(map(tuple, form)) for form in forms)
         return GridCell(tuple(inputs), tuple(unknowns), slopes, bends)
 
     def _prove_step(
@@ -613,18 +615,18 @@ def _predict(numbers: Any, inputs: Sequence[Any], count: int) -> list[Any]:
     unknowns = [numbers[n + k] for k in range(count)]
     for i, off in enumerate(offs):
         slopes = [numbers[n + count * (1 + i) + k] for k in range(count)]
-        for other in islice(offs, i, None):
-            slopes = [slope + other * numbers[number + k] for k, slope in enumerate(slopes)]
+        for off_by in islice(offs, i, None):
+            slopes = [slope + off_by * numbers[number + k] for k, slope in enumerate(slopes)]
             number += count
-        unknowns = [one + off * slope for one, slope in zip(unknowns, slopes, strict=True)]
+        unknowns = [unknown + off * slope for unknown, slope in zip(unknowns, slopes, strict=True)]
     return unknowns
 
 
-def _part_of_way(one: Sequence[float], other: Sequence[float], part: float) -> Sequence[float]:
+def _part_of_way(first: Sequence[float], second: Sequence[float], part: float) -> Sequence[float]:
     """Return inputs at a part of the way; the other end itself at 1."""
     if part == 1.0:
-        return other
-    return [a + part * (b - a) for a, b in zip(one, other, strict=True)]
+        return second
+    return [a + part * (b - a) for a, b in zip(first, second, strict=True)]
 
 
 def _round_binary(values: Sequence[float]) -> tuple[float, ...]:

@@ -94,10 +94,10 @@ class GridGroup(IteratedGroup):
         """
 
         def compute(inputs: Sequence[Any], unknowns: Sequence[Any], *rates: Any) -> list[Any]:
-            given: list[Any] = [*self._before.inputs]
+            values: list[Any] = [*self._before.inputs]
             for k, value in zip(self.inputs, inputs, strict=True):
-                given[k] = value
-            return function(LinkState(given, []), LinkState([*unknowns], []), *rates)
+                values[k] = value
+            return function(LinkState(values, []), LinkState([*unknowns], []), *rates)
 
         home = [self._before.inputs[k] for k in self.inputs]
         rates = [[1.0] * len(moving)] if moving else []
@@ -132,7 +132,7 @@ class GridGroup(IteratedGroup):
         """
         Return the unknowns: steps of Newton's method, and one more with the last slopes.
 
-        An UndecidedError is raised where no cell is, or where the last step is no rounding.
+        An UndecidedError is raised where no cell is, or where the last step is more than rounding.
         """
         values = self.grid.find_start([known.coordinates[1 + k] for k in self.inputs])
         if values is None:
@@ -157,8 +157,8 @@ class GridGroup(IteratedGroup):
             unknowns = self._equations.complete(self._start, solved)
             return GroupPose(Status.OPEN, unknowns, (), short)
         start = self.grid.find_start(inputs)
-        if start is not None and (found := self.solve_from(inputs, start)) is not None:
-            return self._pose_at(solved, found)
+        if start is not None and (solution := self.solve_from(inputs, start)) is not None:
+            return self._pose_at(solved, solution)
         turned, gains = self.grid.turn_back(inputs)
         cell, left = self.grid.reach(turned)
         values = [value + gain for value, gain in zip(cell.unknowns, gains, strict=True)]
@@ -188,8 +188,8 @@ class GridGroup(IteratedGroup):
         The norm is the largest change of an unknown: all in one unit, the largest step; or each in
         its own, its step and some times what the next may be at most. The better one counts.
         """
-        found = self._proof_line(inputs, unknowns)
-        return found[0] if found else inf
+        numbers = self._proof_line(inputs, unknowns)
+        return numbers[0] if numbers else inf
 
     def solve_from(
         self, inputs: Sequence[float], unknowns: Sequence[float]
@@ -207,11 +207,11 @@ class GridGroup(IteratedGroup):
         self, inputs: Sequence[float], unknowns: Sequence[float]
     ) -> tuple[list[Sequence[float]], list[Sequence[float]]] | None:
         """Return slopes and bends at a solution, as a cell has them."""
-        found = self._forms_line(inputs, unknowns)
-        if found is None:
+        numbers = self._forms_line(inputs, unknowns)
+        if numbers is None:
             return None
         size = len(unknowns)
-        rows: list[Sequence[float]] = [*zip(*[iter(found)] * size, strict=True)]
+        rows: list[Sequence[float]] = [*zip(*[iter(numbers)] * size, strict=True)]
         count = len(inputs)
         return rows[:count], rows[count:]
 
@@ -219,23 +219,23 @@ class GridGroup(IteratedGroup):
         self, inputs: Sequence[float], unknowns: Sequence[float], direction: Sequence[float]
     ) -> LineForms | None:
         """Return slopes and bends at a solution while the inputs go in a direction."""
-        found, count = self._line_forms_line(inputs, unknowns, direction), len(unknowns)
-        return None if found is None else (found[:count], found[count:])
+        numbers, count = self._line_forms_line(inputs, unknowns, direction), len(unknowns)
+        return None if numbers is None else (numbers[:count], numbers[count:])
 
     # The functions of the straight lines
 
-    def _list_shortfalls(self, given: LinkState, _pose: LinkState) -> list[Any]:
-        return self._equations.shortfalls(require_state(self._before.known_at(given.coordinates)))
+    def _list_shortfalls(self, at: LinkState, _pose: LinkState) -> list[Any]:
+        return self._equations.shortfalls(require_state(self._before.known_at(at.coordinates)))
 
-    def _list_step(self, given: LinkState, pose: LinkState) -> list[Any]:
+    def _list_step(self, at: LinkState, pose: LinkState) -> list[Any]:
         """Return a step of Newton's method."""
-        known = require_state(self._before.known_at(given.coordinates))
+        known = require_state(self._before.known_at(at.coordinates))
         errors, solve = self._equations.linearize(known, pose.coordinates)
         return solve(errors)
 
-    def _list_proof(self, given: LinkState, pose: LinkState) -> list[Any]:
+    def _list_proof(self, at: LinkState, pose: LinkState) -> list[Any]:
         """Return η·ω, by the size of a step of Newton's method, of the inverse and of bends."""
-        known = require_state(self._before.known_at(given.coordinates))
+        known = require_state(self._before.known_at(at.coordinates))
         unknowns, count = pose.coordinates, len(pose.coordinates)
         errors, solve = self._equations.linearize(known, unknowns)
         steps = [abs(step) + SMALLEST for step in solve(errors)]
@@ -263,68 +263,70 @@ class GridGroup(IteratedGroup):
         return [where(fitted < even, fitted, even)]
 
     def _list_line_forms(
-        self, given: LinkState, pose: LinkState, direction: Sequence[Any]
+        self, at: LinkState, pose: LinkState, direction: Sequence[Any]
     ) -> list[Any]:
-        rates = LinkState([0.0] * len(given.coordinates), [])
+        rates = LinkState([0.0] * len(at.coordinates), [])
         for k, rate in zip(self.inputs, direction, strict=True):
             rates.coordinates[k] = rate
-        slopes = self._list_rates(given, pose, rates)
-        bends = self._list_bends(given, pose, rates, slopes)
+        slopes = self._list_rates(at, pose, rates)
+        bends = self._list_bends(at, pose, rates, slopes)
         return [*self._free_of(slopes), *(0.5 * bend for bend in bends)]
 
     def _free_of(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self._equations.free]
 
-    def _list_rates(self, given: LinkState, pose: LinkState, rates: LinkState) -> list[Any]:
+    def _list_rates(self, at: LinkState, pose: LinkState, rates: LinkState) -> list[Any]:
         """Return the rates of all unknowns at rates of the inputs."""
-        states = self._before.states_at(given.coordinates, rates.coordinates)
+        states = self._before.states_at(at.coordinates, rates.coordinates)
         known, velocities = require_state(states)
         unknowns = self._equations.complete(pose.coordinates, known)
         still = [0.0] * len(unknowns)
         return self._equations.solve_motion(GroupMotion(unknowns, known, still, velocities))
 
     def _list_bends(
-        self, given: LinkState, pose: LinkState, rates: LinkState, slopes: Sequence[Any]
+        self, at: LinkState, pose: LinkState, rates: LinkState, slopes: Sequence[Any]
     ) -> list[Any]:
         """Return the accelerations of the free unknowns at steady rates of the inputs."""
-        steady = [0.0] * len(given.coordinates)
-        states = self._before.states_at(given.coordinates, rates.coordinates, steady)
+        steady = [0.0] * len(at.coordinates)
+        states = self._before.states_at(at.coordinates, rates.coordinates, steady)
         known, velocities, changes = require_state(states)
         unknowns = self._equations.complete(pose.coordinates, known)
         still = [0.0] * len(unknowns)
         motion = GroupMotion(unknowns, known, slopes, velocities, still, changes)
         return self._free_of(self._equations.solve_motion(motion))
 
-    def _list_forms(self, given: LinkState, pose: LinkState) -> list[Any]:
+    def _list_forms(self, at: LinkState, pose: LinkState) -> list[Any]:
         """Return slopes and bends: rates and accelerations along one input, or along two."""
         slopes: list[Any] = []
         squares: dict[tuple[int, int], list[Any]] = {}
         alone: dict[int, list[Any]] = {}
 
         def rates_along(*inputs: int) -> LinkState:
-            return LinkState([float(k in inputs) for k in range(len(given.coordinates))], [])
+            return LinkState([float(k in inputs) for k in range(len(at.coordinates))], [])
 
-        for one in self.inputs:
-            alone[one] = self._list_rates(given, pose, rates_along(one))
-            slopes += self._free_of(alone[one])
-        for one, other in combinations_with_replacement(self.inputs, 2):
-            along, found = rates_along(one, other), alone[one]
-            if one != other:
-                found = [a + b for a, b in zip(found, alone[other], strict=True)]
-            squares[one, other] = self._list_bends(given, pose, along, found)
+        for first in self.inputs:
+            alone[first] = self._list_rates(at, pose, rates_along(first))
+            slopes += self._free_of(alone[first])
+        for first, second in combinations_with_replacement(self.inputs, 2):
+            along, slope = rates_along(first, second), alone[first]
+            if first != second:
+                slope = [a + b for a, b in zip(slope, alone[second], strict=True)]
+            squares[first, second] = self._list_bends(at, pose, along, slope)
         bends = []
-        for (one, other), both in squares.items():
-            if one == other:
+        for (first, second), both in squares.items():
+            if first == second:
                 bends += [0.5 * value for value in both]
             else:
                 # Along both inputs at once: twice what is mixed, and what each has alone.
-                each = zip(both, squares[one, one], squares[other, other], strict=True)
-                bends += [0.5 * (value - a - b) for value, a, b in each]
+                squares_of_pair = zip(
+                    both, squares[first, first], squares[second, second], strict=True
+                )
+                bends += [0.5 * (value - a - b) for value, a, b in squares_of_pair]
         return [*slopes, *bends]
 
 
-def _sum_products(one: Sequence[Any], other: Sequence[Any]) -> Any:
-    return reduce(add, map(multiply, one, other))
+def _sum_products(first: Sequence[Any], second: Sequence[Any]) -> Any:
+    return reduce(add, map(multiply, first, second))
 
 
 def _greatest(values: Sequence[Any]) -> Any:

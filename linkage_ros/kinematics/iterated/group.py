@@ -117,7 +117,7 @@ class Equations:
         drift = self.drift(motion)
         # On a tape the matrix is that of rates and of accelerations, and is there only once.
         matrix = Elimination(self.evaluate(motion.solved, motion.unknowns)[1], self.unit_pivots)
-        return matrix.solve([0.0 if is_zero(each) else -each for each in drift])
+        return matrix.solve([0.0 if is_zero(row) else -row for row in drift])
 
     # The closing equations by the free unknowns
 
@@ -146,8 +146,8 @@ class Equations:
             whole = [0.0] * len(errors)
             for row, value in zip(self.closing, right, strict=True):
                 whole[row] = value
-            found = matrix.solve(whole)
-            return [found[k] for k in self.free]
+            solution = matrix.solve(whole)
+            return [solution[k] for k in self.free]
 
         return [errors[row] for row in self.closing], solve
 
@@ -232,9 +232,9 @@ def find_inputs(
 ) -> tuple[int, ...]:
     """Return the numbers of the inputs that equations depend on; ``start`` is free unknowns."""
     tape, count = Tape(), len(before.inputs)
-    given: list[Any] = [tape.add_input(f'q{k}', x) for k, x in enumerate(before.inputs)]
+    symbols: list[Any] = [tape.add_input(f'q{k}', x) for k, x in enumerate(before.inputs)]
     try:
-        waiting: list[Any] = equations.errors(require_state(before.known_at(given)), start)
+        waiting: list[Any] = equations.errors(require_state(before.known_at(symbols)), start)
     except UndecidedError:
         return tuple(range(count))
     waiting = [number.operation for number in waiting if hasattr(number, 'operation')]
@@ -244,7 +244,7 @@ def find_inputs(
         if operation not in seen:
             seen.add(operation)
             waiting += operation.operands()
-    return tuple(k for k in range(count) if given[k].operation in seen)
+    return tuple(k for k in range(count) if symbols[k].operation in seen)
 
 
 def compile_later(function: Callable[..., list[float]], *kinds: LinkState) -> StraightLine:
@@ -252,8 +252,8 @@ def compile_later(function: Callable[..., list[float]], *kinds: LinkState) -> St
     return StraightLine(function, lambda: kinds)
 
 
-def require_state(found: T | None) -> T:
+def require_state(state: T | None) -> T:
     """Return what the steps before have; UndecidedError is raised where they have none."""
-    if found is None:
+    if state is None:
         raise UndecidedError
-    return found
+    return state

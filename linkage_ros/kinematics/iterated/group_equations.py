@@ -74,13 +74,15 @@ class GroupEquations(Equations):
         self._constraints, self._slides = constraints, tuple(slides)
         self.angles = [not k % 3 for k in range(3 * bodies)]
         self._placed = _place_bodies(constraints, bodies)
-        by_pins = {each.end.body for each in self._placed}
+        by_pins = {placed.end.body for placed in self._placed}
         self.free = tuple(k for k in range(3 * bodies) if not k % 3 or k // 3 not in by_pins)
-        self._sums = ArmSums({each.end.body: (each.end, each.other) for each in self._placed})
+        self._sums = ArmSums(
+            {placed.end.body: (placed.end, placed.other) for placed in self._placed}
+        )
         # The last first: its place is in no other of the equations that remain.
         self.unit_pivots = [
-            (each.row + axis, 3 * each.end.body + 1 + axis)
-            for each in reversed(self._placed)
+            (placed.row + axis, 3 * placed.end.body + 1 + axis)
+            for placed in reversed(self._placed)
             for axis in (0, 1)
         ]
         rows = [
@@ -96,9 +98,9 @@ class GroupEquations(Equations):
         unknowns: list[Any] = [0.0] * len(self.angles)
         for k, value in zip(self.free, values, strict=True):
             unknowns[k] = value
-        for _, end, other in self._placed:
+        for _, end, carrier in self._placed:
             k = 3 * end.body
-            place = subtract(other.place_and_arm(unknowns, solved)[0], end.rotated_arm(unknowns))
+            place = subtract(carrier.place_and_arm(unknowns, solved)[0], end.rotated_arm(unknowns))
             unknowns[k + 1], unknowns[k + 2] = place.real, place.imag
         return unknowns
 
@@ -149,8 +151,8 @@ def _place_bodies(constraints: Sequence[Constraint], bodies: int) -> list[_Place
     row = 0
     for constraint in constraints:
         if isinstance(constraint, CoincidentPoints):
-            one, other = constraint
-            pins += [_PlacedBody(row, one, other), _PlacedBody(row, other, one)]
+            first, second = constraint
+            pins += [_PlacedBody(row, first, second), _PlacedBody(row, second, first)]
         row += 2 if isinstance(constraint, CoincidentPoints) else 1
     placed = []
     unknown = list(range(bodies))
@@ -180,24 +182,24 @@ def make_iterated_step(
             'give inputs, and where points of these links lie then: '
             'pose: {inputs: [...], points: {...}}',
         )
-    found = Constraints(linkage, joints, group.links, planner, group.ratios)
+    equations = Constraints(linkage, joints, group.links, planner, group.ratios)
     solved = close_in_pose(linkage, planner.scale, planner.steps)
     last = 1 + len(linkage.inputs)
     inputs = tuple(solved.coordinates[1:last])
-    pins = {name: solved.pins[i] for name, i in found.known_pins.items()}
+    pins = {name: solved.pins[i] for name, i in equations.known_pins.items()}
     start = guess_unknowns(linkage, group.links, planner, pins, solved)
     far = sum(
-        max(abs(one - other) for one in points.values() for other in points.values())
+        max(abs(first - second) for first in points.values() for second in points.values())
         for points in planner.points.values()
     )
     step = IteratedStep(
-        GroupEquations(found.constraints, found.slides.values(), len(group.links)),
+        GroupEquations(equations.constraints, equations.slides.values(), len(group.links)),
         StepsBefore(tuple(planner.steps), inputs),
         (len(solved.coordinates), len(solved.pins)),
         start,
         grid_inputs(linkage.inputs, inputs, planner.scale),
         far,
         # With ratios, turns of the first input alone are counted.
-        0 if linkage.ratios and len(inputs) > 1 else found.turns,
+        0 if linkage.ratios and len(inputs) > 1 else equations.turns,
     )
-    return step, [*found.slides]
+    return step, [*equations.slides]

@@ -87,7 +87,7 @@ class IteratedStep(Step):
         examples = keep_results(self._trace_examples)
 
         def examples_of(*names: str) -> Callable[[], Sequence[Any] | None]:
-            return lambda: [found[name] for name in names] if (found := examples()) else None
+            return lambda: [values[name] for name in names] if (values := examples()) else None
 
         at, moving = ('known', 'unknowns'), ('velocities', 'rates')
         self._solution_line = StraightLine(self._list_solution, examples_of('known'))
@@ -154,8 +154,8 @@ class IteratedStep(Step):
             return IteratedPose(Status.OPEN, gap, nearest, solved)
         elif (known := group.remembered_pose(solved)) is not None:
             pose = known
-        elif (found := self._solution_line(solved)) is not None:
-            unknowns, links = found
+        elif (solution := self._solution_line(solved)) is not None:
+            unknowns, links = solution
             _append(solved, links)
             return IteratedPose(Status.CLOSED, 0.0, unknowns, solved)
         else:
@@ -174,9 +174,9 @@ class IteratedStep(Step):
     ) -> Sequence[float]:
         """Append the rates of the coordinates and pins that `close` appended."""
         part = self._system.known_part
-        given = part(solved), pose.unknowns, part(velocities)
-        found = None if has_symbols(*given[::2]) else self._rates_line(*given)
-        rates, motion = found or self._list_rates(*given)
+        states = part(solved), pose.unknowns, part(velocities)
+        numbers = None if has_symbols(*states[::2]) else self._rates_line(*states)
+        rates, motion = numbers or self._list_rates(*states)
         _append(velocities, motion)
         return rates
 
@@ -190,9 +190,9 @@ class IteratedStep(Step):
     ) -> None:
         """Append the accelerations of the coordinates and pins that `close` appended."""
         part = self._system.known_part
-        given = part(solved), pose.unknowns, part(velocities), rates, part(changes)
-        found = None if has_symbols(*given[::2]) else self._accelerations_line(*given)
-        _append(changes, found or self._list_accelerations(*given))
+        states = part(solved), pose.unknowns, part(velocities), rates, part(changes)
+        numbers = None if has_symbols(*states[::2]) else self._accelerations_line(*states)
+        _append(changes, numbers or self._list_accelerations(*states))
 
     # The functions of the straight lines
 
@@ -219,8 +219,8 @@ class IteratedStep(Step):
     ) -> LinkState:
         still = [0.0] * len(unknowns)
         motion = GroupMotion(unknowns, known, rates, velocities, still, changes)
-        found = self._equations.solve_motion(motion)
-        return self._equations.move(motion._replace(accelerations=found))
+        accelerations = self._equations.solve_motion(motion)
+        return self._equations.move(motion._replace(accelerations=accelerations))
 
     def _trace_examples(self) -> dict[str, Any]:
         """Return the states at the pose as symbols; nothing if it is at a toggle."""
@@ -261,7 +261,7 @@ class IteratedStep(Step):
             return []
         equations, random, pose = self._equations, Random(count), self.solution.tolist()
         known = require_state(self._before.known_at(self._before.inputs))
-        found, places = [], [equations.list_places(known, pose)]
+        solutions, places = [], [equations.list_places(known, pose)]
         for number in range(count):
             tell_progress('starts of other assemblies tried', number, count)
             values = [
@@ -277,13 +277,13 @@ class IteratedStep(Step):
             if all(max(map(abs, map(sub, own, others))) > _APART for others in places):
                 places.append(own)
                 # Without the digits that differ from machine to machine.
-                found.append(
+                solutions.append(
                     [
                         round(remainder(value, tau) if turned else value, _DIGITS) + 0.0
                         for value, turned in zip(solution, equations.angles, strict=True)
                     ]
                 )
-        return sorted(found)
+        return sorted(solutions)
 
 
 def _append(state: LinkState, links: LinkState) -> None:

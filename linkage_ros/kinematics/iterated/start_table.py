@@ -41,7 +41,7 @@ _DEEPEST = 12
 """How often a cell of the branch is halved at most."""
 
 _SHORTEST = 2.0**-20
-"""The shortest row that is halved, of the branch: beside some toggles none ever fits."""
+"""The shortest row that is halved, of the branch: next to some toggles none ever fits."""
 
 _THIRDS = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
 _TRIED = (0.125, 0.875)
@@ -161,7 +161,7 @@ def _fit_rows(
     low, high, folds, _ = piece
     begin, length = (high, low - high) if folds > 0.0 else (low, high - low)
     solutions = [solution_at(piece.input_at(part)) for part in _THIRDS]
-    known = [each for each in solutions if each is not None]
+    known = [solution for solution in solutions if solution is not None]
     if len(known) == len(solutions) and length:
         values = np.array(known)
         size = float(np.abs(values - values[0]).max())

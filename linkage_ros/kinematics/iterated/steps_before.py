@@ -30,20 +30,20 @@ class StepsBefore:
         states = self.states_at(inputs)
         return None if states is None else states[0]
 
-    def states_at(self, *given: Sequence[float]) -> list[LinkState] | None:
+    def states_at(self, *coordinates: Sequence[float]) -> list[LinkState] | None:
         """
         Return the state of their links, and its derivatives, or None.
 
         The inputs are given, and of their rates and accelerations those that are wanted.
         """
-        states = [LinkState([0.0, *each], []) for each in given]
+        states = [LinkState([0.0, *values], []) for values in coordinates]
         for step in self.steps:
             pose = step.close(states[0])
             if not (pose.status.has_pose if len(states) == 1 else pose.status.has_rates):
                 return None
-            found: Any = step.rates(pose, *states[:2]) if len(states) > 1 else ()
+            rates: Any = step.rates(pose, *states[:2]) if len(states) > 1 else ()
             if len(states) > 2:
-                step.accelerations(pose, found, *states)
+                step.accelerations(pose, rates, *states)
         return states
 
     def trace(self) -> list[LinkState] | None:

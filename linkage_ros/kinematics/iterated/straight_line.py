@@ -51,37 +51,39 @@ class StraightLine:
         try:
             return self._line(*states)
         except (ValueError, OverflowError, ZeroDivisionError):
-            return None  # Numbers overflow: it is no function of them.
+            return None  # Numbers overflow: it is not a function of them.
 
     def _compile(self, states: Sequence[Sequence[Any]]) -> Callable[..., Any]:
-        examples, found = list_numbers(states), None
+        examples, result = list_numbers(states), None
         varying = list(map(_is_symbol, examples))
-        values = [one.operation.value if _is_symbol(one) else one for one in examples]
+        values = [
+            example.operation.value if _is_symbol(example) else example for example in examples
+        ]
         if not any(varying):
             varying = [True] * len(varying)
 
         def compute(*numbers: Any) -> Sequence[Any]:
-            nonlocal found
-            given = zip(numbers, values, varying, strict=True)
-            left = iter([number if varies else value for number, value, varies in given])
-            found = self.function(*(_fill_numbers(state, left) for state in states))
-            return list_numbers(found)
+            nonlocal result
+            triples = zip(numbers, values, varying, strict=True)
+            left = iter([number if varies else value for number, value, varies in triples])
+            result = self.function(*(_fill_numbers(state, left) for state in states))
+            return list_numbers(result)
 
         try:
-            return _nest_call(compile_line(compute, values), states, found)
+            return _nest_call(compile_line(compute, values), states, result)
         except UndecidedError:
             return lambda *_: None
 
 
 def _nest_call(line: Callable[..., Any], states: Sequence[Any], result: Any) -> Callable[..., Any]:
     """Return a line that takes and returns numbers as one of states, nested as the result."""
-    given = [f'x{k}' for k in range(len(list_numbers(states)))]
+    parameters = [f'x{k}' for k in range(len(list_numbers(states)))]
     types: dict[str, Any] = {}
     returned = _part_text(result, (f'found[{k}]' for k in count()), types)
     source = f"""\
 def call(*states):
-    {_part_text(tuple(states), iter(given))} = states
-    found = line({', '.join(given)})
+    {_part_text(tuple(states), iter(parameters))} = states
+    found = line({', '.join(parameters)})
     if found is not None:
         found, = found
         return {returned}
@@ -93,7 +95,7 @@ def _part_text(part: Any, names: Iterator[str], types: dict[str, Any] | None = N
     """Return the text of nested names; with ``types``, which it fills, tuples with fields too."""
     if not isinstance(part, _PARTS):
         return next(names)
-    text = ''.join(f'{_part_text(each, names, types)}, ' for each in part)
+    text = ''.join(f'{_part_text(item, names, types)}, ' for item in part)
     if isinstance(part, list):
         return f'[{text}]'
     if types is None or not hasattr(part, '_fields'):

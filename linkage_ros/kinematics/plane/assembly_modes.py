@@ -64,8 +64,8 @@ def other_assemblies(closure: PlanarClosure, number: int) -> list[Assembly]:
     ]
 
 
-def _are_same(one: Array, other: Array) -> bool:
-    away = one - other
+def _are_same(first: Array, second: Array) -> bool:
+    away = first - second
     away[0::3] -= tau * np.round(away[0::3] / tau)
     return bool(np.abs(away).max() < _SAME)
 

@@ -49,15 +49,15 @@ def check_linkage(linkage: Linkage) -> None:
         _check_slider(linkage, name, slider)
     _check_points(linkage)
     check_inputs(linkage)
-    for given in linkage.inputs:
-        _check_input(linkage, given)
+    for driven in linkage.inputs:
+        _check_input(linkage, driven)
     for name, joint in linkage.joints.items():
         if isinstance(joint, RevoluteJoint):
             for end in ('parent', 'child'):
                 check_name(f'joints.{name}.{end}', getattr(joint, end), 'link', linkage.links)
         else:
             check_name(f'joints.{name}.slider', joint.slider, 'slider', linkage.sliders)
-    joints = [given.joint for given in linkage.inputs]
+    joints = [driven.joint for driven in linkage.inputs]
     check_ratios(linkage, linkage.joints, 'published joint', {*joints, *linkage.joints})
     for name in linkage.ratios:
         _check_follower(linkage, name)
@@ -95,12 +95,12 @@ def _check_points(linkage: Linkage) -> None:
                 raise DefinitionError(
                     f'links.{name}.{point}', f'{place} is not a point', 'write two finite numbers'
                 )
-    for (one, one_points), (other, other_points) in combinations(linkage.links.items(), 2):
+    for (first, one_points), (second, other_points) in combinations(linkage.links.items(), 2):
         shared = sorted(set(one_points) & set(other_points))
         if len(shared) > 1:
             raise DefinitionError(
-                f'links.{other}',
-                f'shares the points {list_names(shared)} with {one!r}',
+                f'links.{second}',
+                f'shares the points {list_names(shared)} with {first!r}',
                 'two links have one pin between them; rename the points that are not pins',
             )
     ends = [point for points in linkage.links.values() for point in points]
@@ -110,16 +110,16 @@ def _check_points(linkage: Linkage) -> None:
     nearest = max(_SHORTEST, _LEAST_RATIO * max(sizes, default=0.0))
     for name, points in linkage.links.items():
         pins = [point for point in points if point in joined]
-        for one, other in combinations(pins, 2):
-            distance = hypot(*(p - q for p, q in zip(points[one], points[other], strict=True)))
+        for first, second in combinations(pins, 2):
+            distance = hypot(*(p - q for p, q in zip(points[first], points[second], strict=True)))
             if not distance:
-                fault, places = f'lies on {one!r}', 'different places'
+                fault, places = f'lies on {first!r}', 'different places'
             elif distance < nearest:
-                fault = f'{other!r} lies {distance:.3g} m from {one!r}'
+                fault = f'{second!r} lies {distance:.3g} m from {first!r}'
                 places = f'places that are at least {nearest:.3g} m apart'
             else:
                 continue
-            key = f'links.{name}.{other}'
+            key = f'links.{name}.{second}'
             raise DefinitionError(key, fault, f'give the two points {places}')
 
 
@@ -149,21 +149,21 @@ def _check_slider(linkage: Linkage, name: str, slider: Slider) -> None:
         )
 
 
-def _check_input(linkage: Linkage, given: Input) -> None:
-    if given.slider:
-        check_name('input.slider', given.slider, 'slider', linkage.sliders)
+def _check_input(linkage: Linkage, driven: Input) -> None:
+    if driven.slider:
+        check_name('input.slider', driven.slider, 'slider', linkage.sliders)
         return
     for end in ('parent', 'child'):
-        check_name(f'input.{end}', getattr(given, end), 'link', linkage.links)
-    if given.parent == given.child:
+        check_name(f'input.{end}', getattr(driven, end), 'link', linkage.links)
+    if driven.parent == driven.child:
         raise DefinitionError(
-            'input.child', f'{quote(given.child)} is its own parent', 'name two links'
+            'input.child', f'{quote(driven.child)} is its own parent', 'name two links'
         )
-    if not set(linkage.links[given.parent]) & set(linkage.links[given.child]):
+    if not set(linkage.links[driven.parent]) & set(linkage.links[driven.child]):
         raise DefinitionError(
-            f'links.{given.child}',
-            f'no point is named both on {given.parent!r} and on {given.child!r}',
-            f'name the pin about which {given.joint!r} turns on both',
+            f'links.{driven.child}',
+            f'no point is named both on {driven.parent!r} and on {driven.child!r}',
+            f'name the pin about which {driven.joint!r} turns on both',
         )
 
 
@@ -171,8 +171,8 @@ def _check_follower(linkage: Linkage, name: str) -> None:
     """Refuse a joint that cannot follow others since it turns about no pin, or is locked."""
     key, joint = f'ratios.{name}', linkage.joints[name]
     if isinstance(joint, RevoluteJoint):
-        one, other = linkage.links[joint.parent], linkage.links[joint.child]
-        if joint.parent == joint.child or not set(one) & set(other):
+        first, second = linkage.links[joint.parent], linkage.links[joint.child]
+        if joint.parent == joint.child or not set(first) & set(second):
             raise DefinitionError(
                 key,
                 f'{quote(joint.parent)} and {quote(joint.child)} have no common pin about '

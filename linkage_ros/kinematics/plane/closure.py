@@ -126,8 +126,8 @@ class PlanarClosure(Closure):
         self, position: Position, velocity: Velocity, acceleration: Acceleration
     ) -> dict[str, PointMotion]:
         """Return `point_motion` by the names of the points."""
-        found = self.point_motion(position, velocity, acceleration)
-        return {point: motion for (_, point), motion in found.items()}
+        motions = self.point_motion(position, velocity, acceleration)
+        return {point: motion for (_, point), motion in motions.items()}
 
     def point_motion(
         self, position: Position, velocity: Velocity, acceleration: Acceleration

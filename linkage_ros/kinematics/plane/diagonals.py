@@ -408,11 +408,13 @@ class NearlyCrossingDiagonal(CrankDiagonal):
         return self._crosses
 
     def diagonal_at(self, solved: LinkState) -> Diagonal:
-        found = super().diagonal_at(solved)
+        diagonal = super().diagonal_at(solved)
         folds, stretches = self._crosses
-        return found._replace(
-            fold=copysign(found.fold, found.near_root) if folds else found.fold,
-            stretch=copysign(found.stretch, found.far_root) if stretches else found.stretch,
+        return diagonal._replace(
+            fold=copysign(diagonal.fold, diagonal.near_root) if folds else diagonal.fold,
+            stretch=copysign(diagonal.stretch, diagonal.far_root)
+            if stretches
+            else diagonal.stretch,
         )
 
 

@@ -87,7 +87,7 @@ class _DrawnAssembly(NamedTuple):
         """Return it with further things that the pose names."""
         places = tuple(target.sight.place_at(self.state) for target in targets)
         away = [abs(at - target.drawn) for at, target in zip(places, targets, strict=True)]
-        square = self.square + sum(one * one for one in away)
+        square = self.square + sum(distance * distance for distance in away)
         return self._replace(square=square, places=self.places + places)
 
     def on_both_sides(self, step: Any) -> Iterator[_DrawnAssembly]:
@@ -103,10 +103,10 @@ class _DrawnAssembly(NamedTuple):
     def is_written(self, ways: Sequence[TwoWays]) -> bool:
         """Return whether its sides are those that the file writes."""
         return all(
-            not one.written
-            or one.written * side > 0.0
-            or (not side and sign == one.written * one.upright)
-            for one, sign, side in zip(ways, self.signs, self.sides, strict=False)
+            not way.written
+            or way.written * side > 0.0
+            or (not side and sign == way.written * way.upright)
+            for way, sign, side in zip(ways, self.signs, self.sides, strict=False)
         )
 
 
@@ -121,27 +121,29 @@ def drawn_signs(
     """
     pose = linkage.pose
     assert pose is not None, 'the caller has one'
-    groups = [_pose_targets(plan, pose, one.dyad) for one in ways]
+    groups = [_pose_targets(plan, pose, way.dyad) for way in ways]
     targets = [target for group in groups for target in group]
-    missing = any(not one.written for one in ways)
-    if not targets and (missing or not any(one.crosses for one in ways)):
+    missing = any(not way.written for way in ways)
+    if not targets and (missing or not any(way.crosses for way in ways)):
         return []
-    found = sorted(_closing_assemblies(linkage, plan, ways, groups), key=lambda one: one.square)
-    written = [one for one in found if one.is_written(ways)]
+    assemblies = sorted(
+        _closing_assemblies(linkage, plan, ways, groups), key=lambda assembly: assembly.square
+    )
+    written = [assembly for assembly in assemblies if assembly.is_written(ways)]
     if not targets:
         # Where it starts, the linkage need not close: then the sides hold as without a pose.
         return list(zip(ways, written[0].signs, strict=True)) if written else []
-    if not found:
+    if not assemblies:
         raise DefinitionError(
             'pose.inputs',
             'do not close the loops in any assembly',
             'give inputs that the linkage can have',
         )
     drawn = [target.drawn for target in targets]
-    if not written or _is_nearer(found[0], written[0], drawn, plan.scale):
-        raise _contradiction_error(ways, found[0])
+    if not written or _is_nearer(assemblies[0], written[0], drawn, plan.scale):
+        raise _contradiction_error(ways, assemblies[0])
     best, *others = written
-    alike = [one for one in others if not _is_nearer(best, one, drawn, plan.scale)]
+    alike = [assembly for assembly in others if not _is_nearer(best, assembly, drawn, plan.scale)]
     if alike:
         raise _ambiguity_error(plan, ways, [best, *alike])
     return list(zip(ways, best.signs, strict=True))
@@ -152,16 +154,16 @@ def _pose_targets(plan: SolvedLinks, pose: AssemblyPose, dyad: Dyad) -> list[_Ta
     links = links_of(dyad)
     known = list(plan.angles)
     before = known[: min(map(known.index, links))]
-    found = []
+    targets = []
     for name, place in pose.points.items():
         carrier = next((link for link in links if name in plan.points[link]), None)
         if carrier and not any(name in plan.points[link] for link in before):
-            found.append(_Target(_point_sight(plan, carrier, name), complex(*place)))
+            targets.append(_Target(_point_sight(plan, carrier, name), complex(*place)))
     for link, angle in pose.angles.items():
         if link in links:
             sight = _angle_sight(plan, link)
-            found.append(_Target(sight, rect(sight.length, angle)))
-    return found
+            targets.append(_Target(sight, rect(sight.length, angle)))
+    return targets
 
 
 def _point_sight(plan: SolvedLinks, link: str, name: str) -> _Sight:
@@ -170,7 +172,7 @@ def _point_sight(plan: SolvedLinks, link: str, name: str) -> _Sight:
 
 def _angle_sight(plan: SolvedLinks, link: str) -> _Sight:
     first, *others = plan.points[link].values()
-    length = max((abs(other - first) for other in others), default=1.0)
+    length = max((abs(point - first) for point in others), default=1.0)
     angle = plan.angles[link]
     return _Sight(None, angle.coordinate, angle.constant, length * plan.scale)
 
@@ -184,44 +186,46 @@ def _closing_assemblies(
     """Return the assemblies in which the loops close, those near to the drawing."""
     assert linkage.pose is not None, 'the caller has one'
     inputs = (
-        value / plan.scale if given.slider else value
-        for value, given in zip(linkage.pose.inputs, linkage.inputs, strict=True)
+        value / plan.scale if driven.slider else value
+        for value, driven in zip(linkage.pose.inputs, linkage.inputs, strict=True)
     )
-    found = [_DrawnAssembly(LinkState([0.0, *inputs], []))]
+    assemblies = [_DrawnAssembly(LinkState([0.0, *inputs], []))]
     both = len(ways) <= _MOST_EXPLORED
-    numbers = {one.step: index for index, one in enumerate(ways)}
+    numbers = {two_way.step: index for index, two_way in enumerate(ways)}
     closed: Sequence[_Target] = ()
     for step, way in enumerate(plan.steps):
         if step not in numbers:
-            found = [one for one in found if way.close(one.state).status.has_pose]
+            assemblies = [
+                assembly for assembly in assemblies if way.close(assembly.state).status.has_pose
+            ]
             continue
         # Steps behind a dyad have placed the other links of its bodies, which inputs hold.
-        found = [one.add_targets(closed) for one in found]
+        assemblies = [assembly.add_targets(closed) for assembly in assemblies]
         number = numbers[step]
         closed = groups[number]
-        if len(found) > _MOST_KEPT:
-            found.sort(key=lambda one: one.square)
-            if found[_MOST_KEPT].square <= _CLEARLY * _CLEARLY * found[0].square:
-                names = list_names(repr(one.assembly_key) for one in ways[:number])
+        if len(assemblies) > _MOST_KEPT:
+            assemblies.sort(key=lambda assembly: assembly.square)
+            if assemblies[_MOST_KEPT].square <= _CLEARLY * _CLEARLY * assemblies[0].square:
+                names = list_names(repr(earlier.assembly_key) for earlier in ways[:number])
                 raise DefinitionError(
                     'pose', f'does not determine the sides of {names}', 'name a point of each'
                 )
-            del found[_MOST_KEPT:]
-        found = [
-            other
-            for one in found
-            for other in one.on_both_sides(way)
-            if both or other.is_written(ways)
+            del assemblies[_MOST_KEPT:]
+        assemblies = [
+            second
+            for first in assemblies
+            for second in first.on_both_sides(way)
+            if both or second.is_written(ways)
         ]
-    return [one.add_targets(closed) for one in found]
+    return [assembly.add_targets(closed) for assembly in assemblies]
 
 
 def _is_nearer(
-    one: _DrawnAssembly, other: _DrawnAssembly, drawn: Sequence[complex], size: float
+    first: _DrawnAssembly, second: _DrawnAssembly, drawn: Sequence[complex], size: float
 ) -> bool:
     """Return whether an assembly is clearly nearer to the drawing, where the two differ."""
     near = far = 0.0
-    for place, elsewhere, target in zip(one.places, other.places, drawn, strict=True):
+    for place, elsewhere, target in zip(first.places, second.places, drawn, strict=True):
         if abs(place - elsewhere) > _SAME * size:
             near += abs(place - target) ** 2
             far += abs(elsewhere - target) ** 2
@@ -230,14 +234,14 @@ def _is_nearer(
 
 def _contradiction_error(ways: Sequence[TwoWays], drawn: _DrawnAssembly) -> DefinitionError:
     """Return the error for the first side that is not the drawn one."""
-    for one, side in zip(ways, drawn.sides, strict=True):
-        if one.written * side < 0.0:
+    for way, side in zip(ways, drawn.sides, strict=True):
+        if way.written * side < 0.0:
             break
-    words = one.side_word(one.written), one.side_word(side)
+    words = way.side_word(way.written), way.side_word(side)
     return DefinitionError(
-        f'assembly.{one.assembly_key}',
+        f'assembly.{way.assembly_key}',
         f'is {words[0]!r}, and {words[1]!r} as pose draws it',
-        f'leave {one.assembly_key} out of assembly, write {words[1]}, or draw the other pose',
+        f'leave {way.assembly_key} out of assembly, write {words[1]}, or draw the other pose',
     )
 
 
@@ -249,12 +253,12 @@ def _ambiguity_error(
     differ = [
         index
         for index in range(len(ways))
-        if any(one.signs[index] != first.signs[index] for one in alike)
+        if any(assembly.signs[index] != first.signs[index] for assembly in alike)
     ]
     sides = []
-    for one in alike[:_MOST_LISTED]:
+    for assembly in alike[:_MOST_LISTED]:
         words = [
-            f'{ways[i].assembly_key}: {ways[i].side_word(one.sides[i] or one.signs[i])}'
+            f'{ways[i].assembly_key}: {ways[i].side_word(assembly.sides[i] or assembly.signs[i])}'
             for i in differ
         ]
         sides.append(f'{{{list_names(words)}}}')
@@ -262,8 +266,8 @@ def _ambiguity_error(
         sides.append(f'{len(alike) - _MOST_LISTED} more')
     telling = []
     for i in differ:
-        other = next(one for one in alike if one.signs[i] != first.signs[i])
-        telling.append(_telling_text(plan, ways[i].dyad, (first.state, other.state)))
+        second = next(assembly for assembly in alike if assembly.signs[i] != first.signs[i])
+        telling.append(_telling_text(plan, ways[i].dyad, (first.state, second.state)))
     return DefinitionError(
         'pose',
         f'does not distinguish {list_names(sides, " from ")}',
@@ -298,15 +302,15 @@ def read_drawn_pose(closure: PlanarClosure, position: Position) -> AssemblyPose:
         place = places[link, point]
         points[point] = (place.real + 0.0, place.imag + 0.0)
 
-    given = closure.linkage.pose
+    drawn = closure.linkage.pose
     for group in closure.structure.groups:
-        if isinstance(group, Iterated) and given is not None:
+        if isinstance(group, Iterated) and drawn is not None:
             links = closure.structure.links
             for link in group.links:
                 for point in links[link]:
-                    if point in given.points:
+                    if point in drawn.points:
                         add_point(link, point)
-                if link in given.angles:
+                if link in drawn.angles:
                     turned[link] = remainder(angles[link], tau)
         elif closes_in_two_ways(group):
             link, point = telling_part(closure.structure.links, group)

@@ -221,13 +221,13 @@ def turn_ratios(ratios: Mapping[str, Ratio], names: Sequence[str]) -> dict[str, 
         chain = []
         while follower in turned:
             ratio = turned.pop(follower)
-            of = next((each for each in ratio.terms if each not in names), '')
+            of = next((term for term in ratio.terms if term not in names), '')
             if not of:
                 others = list_names(ratio.terms)
                 reason = f'and {others} are one freedom: the first follows the other'
                 raise DefinitionError(name, reason, 'name a joint of another freedom')
             factor = ratio.terms[of]
-            also = {each: -by / factor for each, by in ratio.terms.items() if each != of}
+            also = {term: -by / factor for term, by in ratio.terms.items() if term != of}
             chain.append((of, Ratio(follower, 1.0 / factor, -ratio.offset / factor, also)))
             follower = of
         turned |= chain
@@ -289,7 +289,7 @@ class PoseCorrections:
     tilted_by
         The largest angle between axes that a closure takes for parallel, in [rad].
     beside_by
-        The largest distance at which the ends of a pin of the robot lie beside each other, in [m].
+        The largest distance between the two ends of a pin of the robot along its axis, in [m].
 
     """
 
@@ -316,13 +316,13 @@ class JointedLinkage:
     @property
     def named_joints(self) -> dict[str, RevoluteJoint | SlideJoint]:
         """Return all joints with a name in messages: the inputs, then the published ones."""
-        return {given.joint: given.as_joint() for given in self.inputs} | {**self.joints}
+        return {driven.joint: driven.as_joint() for driven in self.inputs} | {**self.joints}
 
     @property
     def limits(self) -> dict[str, Limits]:
         """Return the limits of the joints that have any, by name, inputs first."""
         # An input that is also published has its limits as an input.
-        driven = {given.joint: given.limits for given in self.inputs}
+        driven = {driven.joint: driven.limits for driven in self.inputs}
         named = {name: joint.limits for name, joint in self.named_joints.items()} | driven
         return {name: limits for name, limits in named.items() if limits != NO_LIMITS}
 
@@ -385,7 +385,7 @@ class Linkage(JointedLinkage):
 
     def without_limits(self, joints: Collection[str]) -> Linkage:
         """Return the linkage without the limits of some joints' ranges."""
-        inputs = remove_limits({given.joint: given for given in self.inputs}, joints)
+        inputs = remove_limits({driven.joint: driven for driven in self.inputs}, joints)
         return replace(
             self, inputs=tuple(inputs.values()), joints=remove_limits(self.joints, joints)
         )
@@ -409,8 +409,8 @@ def remove_limits(parts: Mapping[str, Any], names: Collection[str]) -> dict[str,
 
 def links_by_point(links: Mapping[str, Iterable[str]]) -> dict[str, list[str]]:
     """Return the links that carry each point, in the order of the file."""
-    found: dict[str, list[str]] = {}
+    carriers: dict[str, list[str]] = {}
     for link, points in links.items():
         for point in points:
-            found.setdefault(point, []).append(link)
-    return found
+            carriers.setdefault(point, []).append(link)
+    return carriers

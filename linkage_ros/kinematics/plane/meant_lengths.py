@@ -29,8 +29,8 @@ def _is_rounding(off: float, size: float) -> bool:
     return 0.0 < abs(off) <= _IN_LINE * size
 
 
-def _are_equal(one: float, other: float) -> bool:
-    return abs(one - other) <= PAIRED * max(one, other)
+def _are_equal(first: float, second: float) -> bool:
+    return abs(first - second) <= PAIRED * max(first, second)
 
 
 def four_bar_lengths(a: float, b: float, c: float, d: float) -> tuple[float, float, float, float]:

@@ -121,7 +121,7 @@ class SolutionPlan(SolvedLinks):
             nominal = SolutionPlan(linkage.nominal, assur_groups(linkage.nominal))
         if nominal is not None:
             self._nominal = {
-                one.assembly_key: nominal.two_sided_step(one) for one in nominal.two_ways
+                way.assembly_key: nominal.two_sided_step(way) for way in nominal.two_ways
             }
         self._missing: dict[str, str] = {}
         self._driven = linkage.driven_joints
@@ -139,16 +139,16 @@ class SolutionPlan(SolvedLinks):
             self.turn_joints()
         self._choose_sides()
         for name in self._assembly:
-            keys = list_names(repr(one.assembly_key) for one in self.two_ways)
+            keys = list_names(repr(way.assembly_key) for way in self.two_ways)
             raise DefinitionError(
                 f'assembly.{name}',
                 f'{quote(name)} does not close a dyad that has two assemblies',
                 f'name {keys}' if keys else 'leave it out',
             )
 
-    def two_sided_step(self, one: TwoWays) -> Any:
+    def two_sided_step(self, way: TwoWays) -> Any:
         """Return the step of a dyad that closes in two ways, a `TwoSided`."""
-        return self.steps[one.step]
+        return self.steps[way.step]
 
     def _choose_sides(self) -> None:
         """Bring the new dyads into the assembly of the file, or refuse it."""
@@ -157,23 +157,23 @@ class SolutionPlan(SolvedLinks):
         if self._nominal:
             return
         pose = self._linkage.pose
-        crosses = any(one.crosses and one.written for one in new)
+        crosses = any(way.crosses and way.written for way in new)
         if pose is not None and new and (pose.is_drawn or crosses):
             from linkage_ros.kinematics.plane.drawn_pose import (
                 drawn_signs,  # local import: few linkages need it
             )
 
-            for one, sign in drawn_signs(self._linkage, self, new):
-                self.steps[one.step] = self.two_sided_step(one).with_sign(sign)
-                self._missing.pop(one.assembly_key, None)
+            for way, sign in drawn_signs(self._linkage, self, new):
+                self.steps[way.step] = self.two_sided_step(way).with_sign(sign)
+                self._missing.pop(way.assembly_key, None)
         if self._missing:
             verb = 'is' if len(self._missing) == 1 else 'are'
             remedy = f'write {list_names(self._missing.values())}'
             drawn = [
-                one for one in self.two_ways if one.crosses and one.assembly_key in self._missing
+                way for way in self.two_ways if way.crosses and way.assembly_key in self._missing
             ]
             if drawn:
-                parts = (telling_part(self.points, one.dyad) for one in drawn)
+                parts = (telling_part(self.points, way.dyad) for way in drawn)
                 points = list_names(f'{point}: [x, y]' for _, point in parts if point)
                 remedy = (
                     f'draw it, since its side changes at change points: '
@@ -196,7 +196,8 @@ class SolutionPlan(SolvedLinks):
                 with_input = self.turns_with.get(index)
                 if before is not None and with_input is not None:
                     self.turns_with[coordinate] = tuple(
-                        one + sign * other for one, other in zip(before, with_input, strict=True)
+                        first + sign * second
+                        for first, second in zip(before, with_input, strict=True)
                     )
             self.angles[joint.link] = Angle(coordinate, angle.constant, angle.unit)
             self.attach_to_pin(joint.link, joint)
@@ -219,12 +220,12 @@ class SolutionPlan(SolvedLinks):
         }[dyad.kind](dyad)
 
     def _add_rrr(self, dyad: Dyad) -> None:
-        (one,), (other,) = dyad.bodies
+        (first_link,), (second_link,) = dyad.bodies
         first, second = dyad.outer
         closing = dyad.inner.name
-        one_arm = self.pin_vector(one, first.name, closing)
-        other_arm = self.pin_vector(other, second.name, closing)
-        b, c = abs(one_arm), abs(other_arm)
+        first_arm = self.pin_vector(first_link, first.name, closing)
+        second_arm = self.pin_vector(second_link, second.name, closing)
+        b, c = abs(first_arm), abs(second_arm)
         hinge = self._find_hinge(first.name, second.name)
         if hinge is not None and self._drawn_in_space:
             a, b, c, d = four_bar_lengths(hinge.a, b, c, hinge.d)
@@ -242,10 +243,10 @@ class SolutionPlan(SolvedLinks):
         kind: type[RRRDyad] = FoldingRRRDyad if FoldingRRRDyad.passes_fold(diagonal) else RRRDyad
         self._add_two_sided(dyad, kind(diagonal, b, c, 1), upright)
         k = self.new_coordinates(2)
-        self.angles[one] = _link_angle(k, base, one_arm)
-        self.angles[other] = _link_angle(k + 1, base, other_arm)
-        self.attach_to_pin(one, first)
-        self.attach_to_pin(other, second)
+        self.angles[first_link] = _link_angle(k, base, first_arm)
+        self.angles[second_link] = _link_angle(k + 1, base, second_arm)
+        self.attach_to_pin(first_link, first)
+        self.attach_to_pin(second_link, second)
 
     def _add_rpr(self, dyad: Dyad) -> None:
         (rail,), (block,) = dyad.bodies
@@ -296,8 +297,8 @@ class SolutionPlan(SolvedLinks):
         self.slides[name] = Slide(k + 1, line.sign)
 
     def _add_prp(self, dyad: Dyad) -> None:
-        one, other = (outer.to for outer in dyad.outer)
-        pivot = self.common_pin(one, other, ())
+        first, second = (outer.to for outer in dyad.outer)
+        pivot = self.common_pin(first, second, ())
         if pivot is not None:
             self._add_crank_prp(dyad, pivot)
             return
@@ -385,11 +386,11 @@ class SolutionPlan(SolvedLinks):
     def _add_inverted_rrr(self, dyad: Dyad) -> bool:
         """Add a dyad whose outer pins lie on one link, and one of whose sides an input bends."""
         ends = [*zip(dyad.outer, (dyad.inner.link, dyad.inner.to), (1, -1), strict=True)]
-        bent = [one for one in ends if one[0].link != one[1]]
+        bent = [end for end in ends if end[0].link != end[1]]
         if len(bent) != 1 or dyad.outer[0].to != dyad.outer[1].to:
             return False
         ((first, end, order),) = bent
-        ((second, other, _),) = (one for one in ends if one[0].link == one[1])
+        ((second, carrier, _),) = (end for end in ends if end[0].link == end[1])
         transform, *more = self._link_transforms(end, first.link)
         if more or transform.turn < 0:
             return False
@@ -397,7 +398,7 @@ class SolutionPlan(SolvedLinks):
         # From P to A and to B, from B to D, and from A to D on the link that carries both.
         to_first = self.points[first.link][first.name] - transform.origin
         to_closing = self.points[end][closing] - transform.inner
-        to_second = self.pin_vector(other, closing, second.name)
+        to_second = self.pin_vector(carrier, closing, second.name)
         between = self.pin_vector(first.to, first.name, second.name)
         a, b, c, d = map(abs, (to_closing, to_second, between, to_first))
         if not (a and d):
@@ -416,16 +417,16 @@ class SolutionPlan(SolvedLinks):
         self._add_two_sided(dyad, step)
         k = self.new_coordinates(2)
         self.angles[first.link] = _link_angle(k, base, to_first)
-        self.angles[other] = _link_angle(k + 1, base, to_second)
+        self.angles[carrier] = _link_angle(k + 1, base, to_second)
         self.attach_to_pin(first.link, first)
-        self.attach_to_pin(other, second)
+        self.attach_to_pin(carrier, second)
         return True
 
     def _add_geared(self, group: GearedLinks) -> None:
         waiting = list(self._structure.joints_of(group))
         held = {*self.angles}
         while waiting:
-            joint = next(one for one in waiting if held & {one.link, one.to})
+            joint = next(joint for joint in waiting if held & {joint.link, joint.to})
             waiting.remove(joint)
             if joint.link in held:
                 joint = replace(joint, link=joint.to, to=joint.link)
@@ -438,7 +439,7 @@ class SolutionPlan(SolvedLinks):
             self.add_step(step)
             coordinate = self.new_coordinates(1)
             turned = [(factor, self.turns_with[k]) for k, factor in step.factors]
-            by_input = zip(*([f * one for one in turns] for f, turns in turned), strict=True)
+            by_input = zip(*([f * turn for turn in turns] for f, turns in turned), strict=True)
             with_input = tuple(map(sum, by_input)) or self.turns_with[0]
             self.turns_with[coordinate] = with_input
             self.ratio_turns = lcm(self.ratio_turns, count_turns(with_input[0]))
@@ -455,7 +456,7 @@ class SolutionPlan(SolvedLinks):
             point: self.place_pin(point)
             for link in group.links
             for point in self.points[link]
-            if any(point in self.points[one] for one in known)
+            if any(point in self.points[link] for link in known)
         }
         state = close_in_pose(self._linkage, self.scale, self.steps)
         places = {name: state.pins[index] for name, index in pins.items()}
@@ -483,32 +484,32 @@ class SolutionPlan(SolvedLinks):
         """Return the transformations from one link of a body to another, by its driven joints."""
         ways: dict[str, tuple[DrivenOffset, ...]] = {start: ()}
         while end not in ways:
-            for i, given in enumerate(self._driven):
-                for one, other in self._joined_links(i) if self.has_drive(i) else ():
-                    if one in ways and other not in ways:
-                        ways[other] = (
-                            *ways[one],
-                            self._link_transform(self.drive_coordinate(i), given, one, other),
+            for i, driven in enumerate(self._driven):
+                for first, second in self._joined_links(i) if self.has_drive(i) else ():
+                    if first in ways and second not in ways:
+                        ways[second] = (
+                            *ways[first],
+                            self._link_transform(self.drive_coordinate(i), driven, first, second),
                         )
         return ways[end]
 
     def _joined_links(self, index: int) -> tuple[tuple[str, str], tuple[str, str]]:
-        given = self._driven[index]
-        one, other = given.parent, given.child
-        if given.slider:
-            one, other = self._linkage.sliders[given.slider].along, self.blocks[given.slider]
-        return (one, other), (other, one)
+        driven = self._driven[index]
+        first, second = driven.parent, driven.child
+        if driven.slider:
+            first, second = self._linkage.sliders[driven.slider].along, self.blocks[driven.slider]
+        return (first, second), (second, first)
 
-    def _link_transform(self, index: int, given: Input, inner: str, outer: str) -> DrivenOffset:
-        if given.slider:
-            point = self.point_of(given.slider, inner)
-            line = self.slider_line(given.slider, outer, point)
-            self.slides[given.slider] = Slide(index, 1.0)
+    def _link_transform(self, index: int, driven: Input, inner: str, outer: str) -> DrivenOffset:
+        if driven.slider:
+            point = self.point_of(driven.slider, inner)
+            line = self.slider_line(driven.slider, outer, point)
+            self.slides[driven.slider] = Slide(index, 1.0)
             return DrivenOffset(
                 line.start, point, line.angle, -1, index, line.sign, line.direction
             )
         (pin,) = set(self.points[inner]) & set(self.points[outer])
-        sign = 1.0 if given.child == inner else -1.0
+        sign = 1.0 if driven.child == inner else -1.0
         return DrivenOffset(
             self.points[outer][pin], self.points[inner][pin], 0.0, index, -1, sign, 0j
         )
@@ -551,21 +552,21 @@ class SolutionPlan(SolvedLinks):
     def _find_hinge(self, first: str, second: str) -> _Hinge | None:
         """Return the links with a common pin O that carry two pins, or None."""
         known = list(self.angles)
-        for other in self.carrying_links(second):
-            for one in self.carrying_links(first):
-                pivot = self.common_pin(one, other, (first, second))
+        for second_link in self.carrying_links(second):
+            for first_link in self.carrying_links(first):
+                pivot = self.common_pin(first_link, second_link, (first, second))
                 if pivot:
                     a, d = (
-                        self.pin_vector(one, pivot, first),
-                        self.pin_vector(other, pivot, second),
+                        self.pin_vector(first_link, pivot, first),
+                        self.pin_vector(second_link, pivot, second),
                     )
                     angle, base = (
-                        self.angles[one].vector_angle(a),
-                        self.angles[other].vector_angle(d),
+                        self.angles[first_link].vector_angle(a),
+                        self.angles[second_link].vector_angle(d),
                     )
                     offset = phase(angle.unit * base.unit.conjugate())
                     arms = angle.coordinate, base.coordinate
-                    later = known.index(one) > known.index(other)
+                    later = known.index(first_link) > known.index(second_link)
                     return _Hinge(abs(a), abs(d), arms, offset, base, later)
         return None
 

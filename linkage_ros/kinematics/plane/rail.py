@@ -131,7 +131,7 @@ class CrankRail:
         self._below, self._above = below, above
         self._root_length = math.sqrt(2.0 * a)
         self._changes_over = not (below and above)
-        # For `unsigned_link_acceleration`: these sums would cancel for a short crank beside a long
+        # For `unsigned_link_acceleration`: these sums would cancel for a short crank and a long
         # link.
         self._products = (
             (0.0, 0.0)
@@ -192,7 +192,7 @@ class CrankRail:
         if bracket == 0.0:
             return signed_root(bracket, part, square)
         size = self._link + abs(side)
-        # The square has more rounding errors than the side: if as great, it is no better.
+        # The square has more rounding errors than the side: if as great, it is not better.
         shorter = 4.0 * (abs(bracket) + square) < size
         return root_of(
             where(shorter, bracket + square, self._link + side),
@@ -322,18 +322,18 @@ class NearlyCrossingRail(CrankRail):
         return self._crosses
 
     def pin_at(self, solved: LinkState) -> PinOnRail:
-        found = super().pin_at(solved)
+        pin = super().pin_at(solved)
         first, second = self.arms
         swing = solved.coordinates[first] - solved.coordinates[second]
         eta = unit_vector(-0.5 * swing) * self._half_turn
-        below, above, lean = found.below, found.above, found.lean
+        below, above, lean = pin.below, pin.above, pin.lean
         if self._crosses[0]:
             below = copysign(below, eta.imag)
         if self._crosses[1]:
             above = copysign(above, eta.real)
         if all(self._crosses):
             lean = abs(lean)
-        return found._replace(below=below, above=above, lean=lean)
+        return pin._replace(below=below, above=above, lean=lean)
 
 
 class FreeRail:

@@ -26,8 +26,8 @@ def close_in_pose(linkage: Linkage, scale: float, steps: Sequence[Step]) -> Link
     """Return the state after steps at the inputs of the pose; a DefinitionError if it is open."""
     assert linkage.pose is not None
     inputs = (
-        value / scale if given.slider else value
-        for value, given in zip(linkage.pose.inputs, linkage.inputs, strict=True)
+        value / scale if driven.slider else value
+        for value, driven in zip(linkage.pose.inputs, linkage.inputs, strict=True)
     )
     solved = LinkState([0.0, *inputs], [])
     for step in steps:
@@ -55,8 +55,8 @@ def guess_unknowns(
     """
     pose, points, x = linkage.pose, planner.points, solved.coordinates
     assert pose is not None
-    given = {name: complex(*place) / planner.scale for name, place in pose.points.items()}
-    given |= pins
+    targets = {name: complex(*place) / planner.scale for name, place in pose.points.items()}
+    targets |= pins
     angles = {link: x[a.coordinate] + a.constant for link, a in planner.angles.items()}
     angles |= {link: angle for link, angle in pose.angles.items() if link in links}
 
@@ -68,8 +68,8 @@ def guess_unknowns(
             if link not in (block, rail):
                 continue
             turn = slider.angle if link == block else 0.0
-            if all(end in given for end in ends) and given[ends[0]] != given[ends[1]]:
-                along = given[ends[1]] - given[ends[0]]
+            if all(end in targets for end in ends) and targets[ends[0]] != targets[ends[1]]:
+                along = targets[ends[1]] - targets[ends[0]]
                 return phase(along / complex(*slider.direction)) + turn
             if link == block:
                 return angle_of(rail) + turn
@@ -79,10 +79,10 @@ def guess_unknowns(
 
     def angle_of(link: str) -> float:
         if link not in angles:
-            known = [name for name in points[link] if name in given]
+            known = [name for name in points[link] if name in targets]
             apart = [n for n in known[1:] if points[link][n] != points[link][known[0]]]
             if apart:
-                there = given[apart[0]] - given[known[0]]
+                there = targets[apart[0]] - targets[known[0]]
                 angles[link] = phase(there / (points[link][apart[0]] - points[link][known[0]]))
             else:
                 angle = by_slider(link)
@@ -98,12 +98,12 @@ def guess_unknowns(
     start: list[float] = []
     for link in links:
         angle = angle_of(link)
-        known = next((name for name in points[link] if name in given), None)
+        known = next((name for name in points[link] if name in targets), None)
         if known is None:
             raise DefinitionError(
                 'pose.points', f'does not say where {link!r} lies', 'give one of its points'
             )
         first = next(iter(points[link].values()))
-        place = given[known] + rect(1.0, angle) * (first - points[link][known])
+        place = targets[known] + rect(1.0, angle) * (first - points[link][known])
         start += (angle, place.real, place.imag)
     return start

@@ -109,7 +109,7 @@ def sides_at(closure: PlanarClosure, position: Position) -> dict[str, str]:
 
     A dyad in line has none.
     """
-    found: dict[str, str] = {}
+    sides: dict[str, str] = {}
     groups: tuple[Group, ...] = closure.structure.groups
     for step, number, pose in zip(
         closure.steps, closure.step_groups, position.poses, strict=False
@@ -118,5 +118,5 @@ def sides_at(closure: PlanarClosure, position: Position) -> dict[str, str]:
         if isinstance(step, TwoSided) and isinstance(group, Dyad):
             side = step.side_of(pose)
             words = SIDES[group.kind].items()
-            found |= {closing_name(group): word for word, sign in words if sign * side > 0.0}
-    return found
+            sides |= {closing_name(group): word for word, sign in words if sign * side > 0.0}
+    return sides

@@ -138,7 +138,7 @@ class PlanStart:
 
     @classmethod
     def alone(cls, linkage: Linkage, structure: Structure) -> PlanStart:
-        """Return the start of a linkage that is no part of another."""
+        """Return the start of a linkage that is not part of another."""
         count = len(linkage.inputs)
         turns = {k: tuple(float(i + 1 == k) for i in range(count)) for k in range(1 + count)}
         scale = _find_scale(structure.links.values())
@@ -246,27 +246,29 @@ class SolvedLinks:
             self._followers[index] = self.new_coordinates(1)
         return self._followers[index]
 
-    def _add_follower(self, name: str, given: Ratio) -> None:
+    def _add_follower(self, name: str, follower: Ratio) -> None:
         slides = isinstance(self._linkage.joints[name], SlideJoint)
-        number = self._number_of(given.of)
+        number = self._number_of(follower.of)
         if number >= 0 and self.has_drive(number):
             turning = not self._linkage.driven_joints[number].slider
-            one, other, sign, constant = self.drive_coordinate(number), 0, 1.0, 0.0
+            first, second, sign, constant = self.drive_coordinate(number), 0, 1.0, 0.0
         else:
-            turning = isinstance(self._linkage.joints[given.of], RevoluteJoint)
-            one, other, sign, constant = self.joint_term(self._linkage.joints[given.of])
+            turning = isinstance(self._linkage.joints[follower.of], RevoluteJoint)
+            first, second, sign, constant = self.joint_term(self._linkage.joints[follower.of])
         unit = self.scale if slides else 1.0
-        ratio = given.ratio * (1.0 if turning else self.scale) / unit
-        step = FollowerJoint(name, one, other, sign * constant, sign * ratio, given.offset / unit)
-        turns, back = self.turns_with.get(one), self.turns_with.get(other)
+        ratio = follower.ratio * (1.0 if turning else self.scale) / unit
+        step = FollowerJoint(
+            name, first, second, sign * constant, sign * ratio, follower.offset / unit
+        )
+        turns, back = self.turns_with.get(first), self.turns_with.get(second)
         if turns is not None and back is not None:
             # The turns of a sum of inputs are known.
             with_input = tuple(step.ratio * (p - q) for p, q in zip(turns, back, strict=True))
             self.turns_with[self.coordinate_count] = with_input
             self.ratio_turns = lcm(self.ratio_turns, 0 if slides else count_turns(with_input[0]))
-        elif turning and (slides or not given.ratio.is_integer()):
-            of = self._linkage.joints[given.of]
-            if given.of not in self._turned:
+        elif turning and (slides or not follower.ratio.is_integer()):
+            of = self._linkage.joints[follower.of]
+            if follower.of not in self._turned:
                 middle = 0.5 * (of.limits.low + of.limits.high) if of.limits.is_bounded else 0.0
                 step = replace(step, middle=middle)
         self.add_step(step)
@@ -282,13 +284,13 @@ class SolvedLinks:
             i, j, _, constant = self.joint_term(joint)
             ends = (i, j, 1.0) if i not in self.turns_with else (j, i, -1.0)
             if ends[0] not in self.turns_with:
-                units = (self.scale if given.slider else 1.0 for given in self._linkage.inputs)
-                factors = (one * unit for one, unit in zip(joint.near[1:], units, strict=True))
+                units = (self.scale if driven.slider else 1.0 for driven in self._linkage.inputs)
+                factors = (value * unit for value, unit in zip(joint.near[1:], units, strict=True))
                 self.add_step(TurnsNear(*ends, constant, (joint.near[0], *factors)))
 
     def _number_of(self, joint: str) -> int:
         """Return the number of a joint among `Linkage.driven_joints`; -1 if it is not driven."""
-        names = [given.joint for given in self._linkage.driven_joints]
+        names = [driven.joint for driven in self._linkage.driven_joints]
         return names.index(joint) if joint in names else -1
 
     def joint_term(self, joint: RevoluteJoint | SlideJoint) -> tuple[int, int, float, float]:
@@ -314,8 +316,8 @@ class SolvedLinks:
 
     def point_of(self, slider: str, link: str) -> complex:
         """Return the point of a link in a slider."""
-        given = self._linkage.sliders[slider]
-        return self.points[link][given.through if link == given.along else given.point]
+        joint = self._linkage.sliders[slider]
+        return self.points[link][joint.through if link == joint.along else joint.point]
 
     def slider_line(self, name: str, on: str, point: complex) -> SlideLine:
         """Return the line of a point of one link of a slider, in the frame of the other."""
@@ -346,11 +348,11 @@ class SolvedLinks:
         link = self.carrying_links(point)[0]
         return self.place_point(link, self.points[link][point])
 
-    def common_pin(self, one: str, other: str, apart: tuple[str, ...]) -> str | None:
+    def common_pin(self, first: str, second: str, apart: tuple[str, ...]) -> str | None:
         """Return the common pin of two links other than the given points, or None."""
-        if one == other:
+        if first == second:
             return None
-        shared = set(self.points[one]) & set(self.points[other]) - set(apart)
+        shared = set(self.points[first]) & set(self.points[second]) - set(apart)
         return min(shared, default=None)
 
 
@@ -386,9 +388,9 @@ def solve_geared_links(
     matrix: list[list[Fraction]] = []
     rights: list[_Row] = []  # Factors of the coordinates; −1 has the constant
     for name in group.ratios:
-        given = linkage.ratios[name]
-        row, right = [Fraction(0)] * len(group.links), {-1: Fraction(given.offset)}
-        for joint, factor in ((name, Fraction(1)), (given.of, -Fraction(given.ratio))):
+        ratio = linkage.ratios[name]
+        row, right = [Fraction(0)] * len(group.links), {-1: Fraction(ratio.offset)}
+        for joint, factor in ((name, Fraction(1)), (ratio.of, -Fraction(ratio.ratio))):
             ends = linkage.joints[joint]
             assert isinstance(ends, RevoluteJoint)
             for link, by in ((ends.child, factor), (ends.parent, -factor)):
@@ -398,7 +400,7 @@ def solve_geared_links(
                     angle = known[link]
                     right[angle.coordinate] = right.get(angle.coordinate, Fraction(0)) - by
                     right[-1] -= by * Fraction(angle.constant)
-        if pose is not None and (turns := count_turns(given.ratio)):
+        if pose is not None and (turns := count_turns(ratio.ratio)):
             # Without the turns of its links, an angle determines the other one modulo a tooth.
             x, angles = pose
             values = [1.0 if k < 0 else x[k] for k in right]

@@ -53,7 +53,7 @@ often steps may be halved without the value: it falls with them next to a zero.
 
 def turning_points(closure: Closure) -> dict[str, list[float]]:
     """Return for each published joint where it turns back over a single input, in its limits."""
-    found: dict[str, list[float]] = {}
+    places_of: dict[str, list[float]] = {}
     compiled = Compiled(closure, 1, within_limits=False)
     for name in closure.joint_names:
         places: list[float] = []
@@ -62,11 +62,13 @@ def turning_points(closure: Closure) -> dict[str, list[float]]:
             for branch in crank_branches(closure, output, compiled=compiled):
                 ends = zip((branch.first, branch.last), branch.turns_back, strict=True)
                 for place in (end for end, turns in ends if turns):
-                    if all(abs(signed_distance(closure, place, one)) > _SAME for one in places):
+                    if all(
+                        abs(signed_distance(closure, place, known)) > _SAME for known in places
+                    ):
                         places.append(place)
         if places:
-            found[name] = sorted(places)
-    return found
+            places_of[name] = sorted(places)
+    return places_of
 
 
 def find_standing_state(closure: Closure) -> tuple[float, ...] | None:
@@ -117,7 +119,7 @@ def _smallest_singular_values(closure: Closure, inputs: Array) -> Array:
         return closure.solve(at, rates=np.tile(rates, (len(at), 1)), derivatives=1)
 
     # A rate of each input in turn.
-    ways = np.diag([closure.scale if one.slider else 1.0 for one in closure.linkage.inputs])
+    ways = np.diag([closure.scale if driven.slider else 1.0 for driven in closure.linkage.inputs])
     solved = solve(inputs, ways[0])
     known = np.isin(solved.status, [CODES[Status.CLOSED], CODES[Status.CHANGE_POINT]])
     others: list[Any] = [solve(inputs[known], rates).velocities for rates in ways[1:]]

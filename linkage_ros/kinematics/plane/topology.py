@@ -230,7 +230,9 @@ class _GroupSearch:
         self._sliders = {j.name: j for j in joints if j.kind == 'P'}
         self._rank = {GROUND: 0}
         self._order = {link: i for i, link in enumerate(links)}
-        self._drives = tuple(self._driven_joint(given, blocks) for given in linkage.driven_joints)
+        self._drives = tuple(
+            self._driven_joint(driven, blocks) for driven in linkage.driven_joints
+        )
         # Of the ratios those whose other joint is not known yet; and that joint.
         self._waiting = {
             index: (ratio.of, find_followed_links(linkage, blocks, ratio.of))
@@ -285,17 +287,17 @@ class _GroupSearch:
         ends: set[str] = set()
         for name in ratios:
             for joint in (name, self._linkage.ratios[name].of):
-                given = self._linkage.joints.get(joint)
-                if not isinstance(given, RevoluteJoint):
+                driven = self._linkage.joints.get(joint)
+                if not isinstance(driven, RevoluteJoint):
                     return False
-                ends |= {given.parent, given.child}
+                ends |= {driven.parent, driven.child}
         return ends <= links | self._turning
 
-    def _driven_joint(self, given: Input, blocks: Mapping[str, str]) -> Joint:
-        if given.slider:
-            return self._sliders[given.slider]
-        (pin,) = set(self._links[given.parent]) & set(self._links[given.child])
-        return Joint('R', pin, given.child, given.parent)
+    def _driven_joint(self, driven: Input, blocks: Mapping[str, str]) -> Joint:
+        if driven.slider:
+            return self._sliders[driven.slider]
+        (pin,) = set(self._links[driven.parent]) & set(self._links[driven.child])
+        return Joint('R', pin, driven.child, driven.parent)
 
     def _drive_links(self, index: int) -> tuple[str, str]:
         drive = self._drives[index]
@@ -303,16 +305,16 @@ class _GroupSearch:
 
     def _held_error(self, index: int, how: str) -> DefinitionError:
         """Return the error for a driven joint whose two links are held already."""
-        one, other = self._drive_links(index)
+        first, second = self._drive_links(index)
         kind = 'input' if index < len(self._linkage.inputs) else 'ratio'
         key = f'{"ratios" if kind == "ratio" else kind}.{self._linkage.driven_joints[index].joint}'
         return DefinitionError(
-            key, f'{one!r} and {other!r} {how}', f'leave one of the {kind}s out'
+            key, f'{first!r} and {second!r} {how}', f'leave one of the {kind}s out'
         )
 
     def _start_following(self) -> list[int]:
         """Merge the bodies anew if ratios have become known; return these."""
-        found: list[int] = []
+        known_ratios: list[int] = []
         while True:
             names = {self._linkage.driven_joints[index].joint for index in self._waiting}
             new = [
@@ -324,10 +326,10 @@ class _GroupSearch:
                 break
             for index in new:
                 del self._waiting[index]
-            found += new
-        if found or not self._bodies:
+            known_ratios += new
+        if known_ratios or not self._bodies:
             self._bodies = self._merge_bodies()
-        return found
+        return known_ratios
 
     def _solved_with(self, bodies: Collection[tuple[str, ...]]) -> list[int]:
         """Return the ratios that wait and whose two joints are known with these bodies."""
@@ -344,10 +346,10 @@ class _GroupSearch:
         for index, drive in enumerate(self._drives):
             if index in self._waiting:
                 continue
-            one, other = body_of[drive.link], body_of[drive.to]
-            if one == other:
+            first, second = body_of[drive.link], body_of[drive.to]
+            if first == second:
                 raise self._held_error(index, 'are held by other driven joints already')
-            both = tuple(sorted(one + other, key=self._order.__getitem__))
+            both = tuple(sorted(first + second, key=self._order.__getitem__))
             for link in both:
                 body_of[link] = both
         return sorted(set(body_of.values()), key=lambda body: self._order[body[0]])
@@ -376,7 +378,7 @@ class _GroupSearch:
         if index < count:
             return True
         of = tuple(self._linkage.ratios.values())[index - count].of
-        names = [given.joint for given in self._linkage.driven_joints]
+        names = [driven.joint for driven in self._linkage.driven_joints]
         if of in names:
             return self._turns(names.index(of))
         followed = self._linkage.joints[of]
@@ -394,25 +396,25 @@ class _GroupSearch:
                     pins.setdefault(point, Joint('R', point, link, carriers[0]))
         joints = list(pins.values())
         for joint in self._sliders.values():
-            for one, other in ((joint.link, joint.to), (joint.to, joint.link)):
-                if one in body and other in self._rank:
-                    joints.append(Joint('P', joint.name, one, other))
+            for first, second in ((joint.link, joint.to), (joint.to, joint.link)):
+                if first in body and second in self._rank:
+                    joints.append(Joint('P', joint.name, first, second))
         return joints
 
-    def _inner_joints(self, one: tuple[str, ...], other: tuple[str, ...]) -> list[Joint]:
+    def _inner_joints(self, first: tuple[str, ...], second: tuple[str, ...]) -> list[Joint]:
         """Return the joints between two bodies, without pins that are known already."""
         known = {point for link in self._rank for point in self._links[link]}
         pins: dict[str, Joint] = {}
-        for link in one:
-            for to in other:
+        for link in first:
+            for to in second:
                 for point in self._links[link]:
                     if point in self._links[to] and point not in known:
                         pins.setdefault(point, Joint('R', point, link, to))
         joints = list(pins.values())
         for joint in self._sliders.values():
-            if joint.link in one and joint.to in other:
+            if joint.link in first and joint.to in second:
                 joints.append(Joint('P', joint.name, joint.link, joint.to))
-            if joint.link in other and joint.to in one:
+            if joint.link in second and joint.to in first:
                 joints.append(Joint('P', joint.name, joint.to, joint.link))
         return joints
 
@@ -425,19 +427,21 @@ class _GroupSearch:
                     f'is over-constrained by {" and ".join(_joint_text(j) for j in joints)}',
                     'take one of them away: with both it cannot move',
                 )
-        for one, other in combinations(unknown, 2):
-            if not (outer[one] and outer[other]):
+        for first, second in combinations(unknown, 2):
+            if not (outer[first] and outer[second]):
                 continue
-            inner = self._inner_joints(one, other)
+            inner = self._inner_joints(first, second)
             if len(inner) > 1:
                 raise DefinitionError(
-                    _file_key(other, self._linkage),
-                    f'is joined to {one[0]!r} twice: by '
+                    _file_key(second, self._linkage),
+                    f'is joined to {first[0]!r} twice: by '
                     f'{" and ".join(_joint_text(j) for j in inner)}',
                     'take one of them away, or make one link of the two',
                 )
             if inner:
-                dyad = self._make_dyad((one, other), (outer[one][0], outer[other][0]), inner[0])
+                dyad = self._make_dyad(
+                    (first, second), (outer[first][0], outer[second][0]), inner[0]
+                )
                 if dyad is not None:
                     return dyad
         return None
@@ -480,8 +484,8 @@ class _GroupSearch:
         """Return the smallest set of bodies that has as many unknowns as constraints."""
         constrained = {body: len(self._outer_joints(body)) for body in unknown}
         between = {
-            frozenset((one, other)): self._inner_joints(one, other)
-            for one, other in combinations(unknown, 2)
+            frozenset((first, second)): self._inner_joints(first, second)
+            for first, second in combinations(unknown, 2)
         }
         largest = len(unknown) if len(unknown) <= 14 else 0
         for size in range(1, min(largest, _LARGEST_GROUP) + 1):
@@ -520,19 +524,19 @@ class _GroupSearch:
         """Count the degrees of freedom of bodies; a pin of three links counts twice."""
         joints = sum(constrained[body] for body in bodies)
         pins: dict[str, set[tuple[str, ...]]] = {}
-        for one, other in combinations(bodies, 2):
-            for joint in between[frozenset((one, other))]:
+        for first, second in combinations(bodies, 2):
+            for joint in between[frozenset((first, second))]:
                 if joint.kind == 'P':
                     joints += 1
                 else:
-                    pins.setdefault(joint.name, set()).update((one, other))
+                    pins.setdefault(joint.name, set()).update((first, second))
         joints += sum(len(carriers) - 1 for carriers in pins.values())
         return 3 * len(bodies) - 2 * joints - len(self._solved_with(bodies))
 
 
 def find_followed_links(linkage: Linkage, blocks: Mapping[str, str], joint: str) -> frozenset[str]:
     """Return the links of a joint that another one follows; of an input none."""
-    if joint in (given.joint for given in linkage.inputs):
+    if joint in (driven.joint for driven in linkage.inputs):
         return frozenset()
     of = linkage.joints[joint]
     if isinstance(of, RevoluteJoint):

@@ -8,7 +8,7 @@
 """
 The points of a spatial linkage in its pose, and the links that carry them.
 
-The axis of a hinge gives two points to both of its links, and a slide two points beside it to the
+The axis of a hinge gives two points to both of its links, and a slide two points off it to the
 link that it is on, if that is not the ground. Points of one link in one place are one point.
 """
 
@@ -85,10 +85,10 @@ class CarriedPoints:
     def _spans(self, points: list[str]) -> bool:
         """Return whether points do not lie on one line."""
         start, *others = (self.places[point] for point in points)
-        arms = [minus(other, start) for other in others]
+        arms = [minus(place, start) for place in others]
         return any(
-            length(cross(one, other)) > 1e-3 * length(one) * length(other)
-            for one, other in combinations(arms, 2)
+            length(cross(first, second)) > 1e-3 * length(first) * length(second)
+            for first, second in combinations(arms, 2)
         )
 
     def _add_beside(self, slide: str, tube: str) -> None:
@@ -104,14 +104,14 @@ class CarriedPoints:
         """Make one point of those that share a link and a place, as in a universal joint."""
         self.same = {name: name for name in self.places}
         """For each point the one that it is known by."""
-        found = True
-        while found:
-            found = False
+        merged = True
+        while merged:
+            merged = False
             for points in self.carried.values():
-                for one, other in combinations(points, 2):
-                    if dist(self.places[one], self.places[other]) < SAME:
-                        self._make_same(one, other)
-                        found = True
+                for first, second in combinations(points, 2):
+                    if dist(self.places[first], self.places[second]) < SAME:
+                        self._make_same(first, second)
+                        merged = True
                         break
 
     def _make_same(self, kept: str, gone: str) -> None:
@@ -129,7 +129,7 @@ class CarriedPoints:
 
 def _unit(vector: Vector) -> Vector:
     size = hypot(*vector)
-    x, y, z = (one / size for one in vector)
+    x, y, z = (component / size for component in vector)
     return drop_rounding((x, y, z))
 
 

@@ -62,7 +62,7 @@ _MET = 1e-4
 """Largest gap of a redundant equation, relative to the size: CAD rounds."""
 
 _BESIDE = 0.01
-"""How far beside a pose a linkage is judged, in [rad] or [m]."""
+"""How far from a pose a linkage is judged, in [rad] or [m]."""
 
 _STATES = 64
 """Number of states over the inputs in which redundant equations are checked."""
@@ -130,7 +130,7 @@ class SpaceClosure(Closure):
         self.freedom: Freedom = freedom
 
     def _freedom_beside_pose(self, still: SpaceLinkage) -> Freedom | None:
-        """Return the degrees of freedom of a linkage of this plan beside a change point."""
+        """Return the degrees of freedom of a linkage of this plan next to a change point."""
         from linkage_ros.kinematics.space.freedom import (
             find_freedom,  # local import: it loads numpy
         )
@@ -173,8 +173,12 @@ class SpaceClosure(Closure):
         return replace(
             linkage,
             points=self._find_places(position.state, linkage.points),
-            hinges={name: redraw(name, one, slides=False) for name, one in linkage.hinges.items()},
-            slides={name: redraw(name, one, slides=True) for name, one in linkage.slides.items()},
+            hinges={
+                name: redraw(name, hinge, slides=False) for name, hinge in linkage.hinges.items()
+            },
+            slides={
+                name: redraw(name, slide, slides=True) for name, slide in linkage.slides.items()
+            },
         )
 
     def plan_exchange(self, names: Sequence[str], _near: Near) -> Plan:
@@ -248,16 +252,16 @@ class SpaceClosure(Closure):
         self, position: Position, velocity: Velocity, acceleration: Acceleration
     ) -> dict[str, tuple[Vector, Vector, Vector]]:
         """Return place, velocity and acceleration of every traced point, in [m]."""
-        found = {}
+        motions = {}
         for point in self.linkage.traced:
             index = self._plan.points.get(self._plan.same[point])
             if index is not None:
                 place, rate, change = (
-                    scale(self.scale, one.state.pins[index])
-                    for one in (position, velocity, acceleration)
+                    scale(self.scale, motion.state.pins[index])
+                    for motion in (position, velocity, acceleration)
                 )
-                found[point] = (place, rate, change)
-        return found
+                motions[point] = (place, rate, change)
+        return motions
 
     def point_tracker(
         self, points: Sequence[tuple[str, Vector]], links: Sequence[str] = ()
@@ -312,7 +316,7 @@ class SpaceClosure(Closure):
 
         """
         self._check_pose('frames', position)
-        plan, found = self._plan, {}
+        plan, frames = self._plan, {}
         for link in self.linkage.link_names:
             if link in plan.frames:
                 frame, drawn = position.state.pins[plan.frames[link]], plan.pose_frames[link]
@@ -320,14 +324,14 @@ class SpaceClosure(Closure):
                 columns = [
                     frame.turn(drawn.resolve(axis)) for axis in plan.pose_frames['ground'][:3]
                 ]
-                found[link] = (scale(self.scale, frame.origin), _quaternion_of(columns))
+                frames[link] = (scale(self.scale, frame.origin), _quaternion_of(columns))
             else:
                 points = self.points(position)
-                one, other, *_ = self.linkage.links[link]
-                drawn_way = minus(self.linkage.points[other], self.linkage.points[one])
-                way = minus(points[other], points[one])
-                found[link] = (points[one], _shortest_turn(drawn_way, way))
-        return found
+                first, second, *_ = self.linkage.links[link]
+                drawn_way = minus(self.linkage.points[second], self.linkage.points[first])
+                way = minus(points[second], points[first])
+                frames[link] = (points[first], _shortest_turn(drawn_way, way))
+        return frames
 
     def closing_errors(self, position: Position) -> list[float]:
         """
@@ -355,9 +359,9 @@ class SpaceClosure(Closure):
             for place in places:
                 yield length(minus(known.setdefault(point, places[0]), place))
         for link in plan.idle:
-            for one, other in pairwise(plan.carried[link]):
-                size = dist(plan.places[one], plan.places[other])
-                yield length(minus(known[one], known[other])) - size
+            for first, second in pairwise(plan.carried[link]):
+                size = dist(plan.places[first], plan.places[second])
+                yield length(minus(known[first], known[second])) - size
         for joint in linkage.slides.values():
             if joint.parent in plan.frames and joint.child in plan.frames:
                 yield from self._slide_errors(state, joint)
@@ -422,12 +426,12 @@ class SpaceClosure(Closure):
         They are sought at the inputs of the pose, from random starts. Each has the values of these
         joints, in [rad] or [m]: another assembly is another pose of the file.
         """
-        found: dict[int, list[dict[str, float]]] = {}
+        assemblies: dict[int, list[dict[str, float]]] = {}
         for number, (knot, unknown) in self._knots.items():
             # A platform that only rods carry has no joints of the file.
             joints = self.linkage.pair_joints
             units = [1.0 if name in self.linkage.hinges else self.scale for name in unknown]
-            found[number] = [
+            assemblies[number] = [
                 {
                     name: value * unit
                     for name, value, unit in zip(unknown, values, units, strict=True)
@@ -436,7 +440,7 @@ class SpaceClosure(Closure):
                 for values in knot.other_solutions(starts)
                 if not joints.keys().isdisjoint(unknown)
             ]
-        return found
+        return assemblies
 
     def slide_reach(self, number: int) -> tuple[float, float]:
         """Return between which values an input that slides is worth a trial, in [m]."""
@@ -492,13 +496,13 @@ def _check_closed(closure: SpaceClosure) -> None:
     if not closure.freedom.redundant:
         return
     sides = [*_states_beside(closure)]
-    if not all(any(found.status.has_pose for _, found in pair) for pair in sides):
+    if not all(any(position.status.has_pose for _, position in pair) for pair in sides):
         raise _refusal_of(closure, 'open on both sides of the pose')
-    each = max(2, int(_STATES ** (1.0 / len(pose))))
+    steps = max(2, int(_STATES ** (1.0 / len(pose))))
     gap, inputs = max(
-        (closure.residual(found), at)
-        for at, found in ((pose, position), *chain(*sides), *grid_positions(closure, each))
-        if found.status.has_pose
+        (closure.residual(position), at)
+        for at, position in ((pose, position), *chain(*sides), *grid_positions(closure, steps))
+        if position.status.has_pose
     )
     if gap > _MET * size_of(closure.linkage):
         places = ', '.join(f'{value:.4g}' for value in inputs)
@@ -516,12 +520,12 @@ def _refusal_of(closure: SpaceClosure, why: str) -> _OverconstrainedError:
 
 
 def _states_beside(closure: SpaceClosure) -> Iterator[list[tuple[tuple[float, ...], Position]]]:
-    """Yield the states beside the pose, for each input those on its two sides."""
-    for number, given in enumerate(closure.linkage.inputs):
+    """Yield the states next to the pose, for each input those on its two sides."""
+    for number, driven in enumerate(closure.linkage.inputs):
         sides = []
         for way in (-_BESIDE, _BESIDE):
             at = [*closure.linkage.pose.inputs]
-            at[number] += way * (closure.scale if given.slider else 1.0)
+            at[number] += way * (closure.scale if driven.slider else 1.0)
             sides.append((tuple(at), closure.close_unlimited(*at)))
         yield sides
 
@@ -541,13 +545,13 @@ def _quaternion_of(columns: list[Vector]) -> Quaternion:
     return x, y, z, w
 
 
-def _shortest_turn(one: Vector, other: Vector) -> Quaternion:
+def _shortest_turn(first: Vector, second: Vector) -> Quaternion:
     """Return the quaternion of the shortest rotation from one direction to another."""
-    one, other = scale(1.0 / length(one), one), scale(1.0 / length(other), other)
-    half = sqrt(max(0.5 * (1.0 + dot(one, other)), 0.0))
+    first, second = scale(1.0 / length(first), first), scale(1.0 / length(second), second)
+    half = sqrt(max(0.5 * (1.0 + dot(first, second)), 0.0))
     if half < 1e-9:
         return 0.0, 0.0, 0.0, 1.0
-    x, y, z = scale(0.5 / half, cross(one, other))
+    x, y, z = scale(0.5 / half, cross(first, second))
     return x, y, z, half
 
 
@@ -575,7 +579,7 @@ def carry_platforms(
     hinges, slides = dict(linkage.hinges), dict(linkage.slides)
     for link in platforms:
         places = [linkage.points[point] for point in linkage.links[link]]
-        x, y, z = (fsum(one) / len(places) for one in zip(*places, strict=True))
+        x, y, z = (fsum(coordinates) / len(places) for coordinates in zip(*places, strict=True))
         at, on = (x, y, z), GROUND
         for prefix, joints in (('', slides), ('r', hinges)):
             for letter, axis in zip('xyz', GROUND_FRAME[:3], strict=True):

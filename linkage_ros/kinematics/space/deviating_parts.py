@@ -186,25 +186,24 @@ class _DeviatingParts:
         return np.concatenate([way, np.cross(place - self._origins[link], way) / self._size])
 
     def _distance_along(
-        self, one: str, other: str, places: tuple[Vectors, Vectors], way: Vectors
+        self, first: str, second: str, places: tuple[Vectors, Vectors], way: Vectors
     ) -> Any:
         """Return how far two places of links are apart along a direction, with its slopes."""
         start, end = places
-        slopes = {
-            one: -self._slope(one, start, way),
-            other: self._slope(other, end, way),
-        }
+        slopes = {first: -self._slope(first, start, way), second: self._slope(second, end, way)}
         return float((end - start) @ way), slopes
 
     def _coincidences(self) -> Iterator[Any]:
         """Yield the errors of points that links share, and of axes."""
         shared = self._linkage.shared_points(on_axes=False)
-        ends = [(one, other, name, self._linkage.points[name]) for name, one, other in shared]
+        ends = [
+            (first, second, name, self._linkage.points[name]) for name, first, second in shared
+        ]
         ends += [(h.parent, h.child, name, h.at) for name, h in self._linkage.hinges.items()]
-        for one, other, name, drawn in ends:
-            places = self._place(one, name, drawn), self._place(other, name, drawn)
+        for first, second, name, drawn in ends:
+            places = self._place(first, name, drawn), self._place(second, name, drawn)
             for way in np.eye(3):
-                yield self._distance_along(one, other, places, way)
+                yield self._distance_along(first, second, places, way)
 
     def _axes(self, name: str) -> tuple[Vectors, Vectors]:
         """Return across, across and along a joint's axis: the directions on parent and child."""
@@ -233,11 +232,11 @@ class _DeviatingParts:
         """Yield by how much joints turn or move where they may not, or are driven."""
         driven = self._linkage.driven
         for name, joint in self._linkage.pair_joints.items():
-            (one, two, _), (_, other, along) = self._axes(name)
-            yield self._right_angle_error(joint, one, along)
+            (first, two, _), (_, second, along) = self._axes(name)
+            yield self._right_angle_error(joint, first, along)
             yield self._right_angle_error(joint, two, along)
             if name in self._linkage.slides or name in driven:
-                yield self._right_angle_error(joint, one, other)
+                yield self._right_angle_error(joint, first, second)
             if name in self._linkage.slides:
                 ways = self._axes(name)[0]
                 for way in ways if name in driven else ways[:2]:
@@ -267,9 +266,9 @@ class _DeviatingParts:
         """Yield by how much driven struts differ from their lengths."""
         for name in self._linkage.struts.keys() & {*self._linkage.driven}:
             ends = [self._point(point) for point in self._linkage.struts[name]]
-            (one, start), (other, end) = ends
+            (first, start), (second, end) = ends
             way = (end - start) / np.linalg.norm(end - start)
-            apart, slopes = self._distance_along(one, other, (start, end), way)
+            apart, slopes = self._distance_along(first, second, (start, end), way)
             yield apart - self._linkage.pose_value(name), slopes
 
     def _ratios(self) -> Iterator[Any]:

@@ -74,11 +74,11 @@ _SAMPLES, _HALVINGS = 180, 52
 """Samples of a form of degree 4, which has four extremes at most, and of a part between two."""
 
 
-def _times(one: Form, other: Form) -> Form:
+def _times(first: Form, second: Form) -> Form:
     """Return the product of two forms."""
-    total = [0.0] * (len(one) + len(other) - 1)
-    for i, a in enumerate(one):
-        for k, b in enumerate(other):
+    total = [0.0] * (len(first) + len(second) - 1)
+    for i, a in enumerate(first):
+        for k, b in enumerate(second):
             total[i + k] += a * b
     return tuple(total)
 
@@ -222,11 +222,11 @@ class Course(NamedTuple):
     def square_from(self, start: Vector) -> Form:
         """Return the form of degree 2 of the square of the distance from a place of the seat."""
         x, y, z = self.place
-        one, both, other = ((x[k], y[k], z[k]) for k in range(3))
+        first, both, second = ((x[k], y[k], z[k]) for k in range(3))
         if not self.turns:
-            arm = minus(one, start)
+            arm = minus(first, start)
             return dot(arm, arm), 2.0 * dot(arm, both), dot(both, both)
-        centre, ahead = scale(0.5, plus(one, other)), scale(0.5, minus(one, other))
+        centre, ahead = scale(0.5, plus(first, second)), scale(0.5, minus(first, second))
         arm = minus(centre, start)
         size, change = dot(arm, arm) + dot(ahead, ahead), 2.0 * dot(arm, ahead)
         return size + change, 2.0 * dot(arm, both), size - change

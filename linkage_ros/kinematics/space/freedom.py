@@ -81,19 +81,19 @@ class _MotionEquations:
 
     def _of_link(self, link: str, rows: Array) -> Array:
         """Return rows in the six numbers of a link as rows in those of all."""
-        found = np.zeros((len(rows), len(self._links), 6))
-        found[:, self._links[link]] = rows
-        return found.reshape(len(rows), self.size)
+        rows_of_all = np.zeros((len(rows), len(self._links), 6))
+        rows_of_all[:, self._links[link]] = rows
+        return rows_of_all.reshape(len(rows), self.size)
 
     def rate(self, name: str) -> Array:
         """Return the row of a joint's rate, in the unit of the file."""
         linkage, carried = self._linkage, self._carried
         if name in linkage.struts:
-            one, other = linkage.struts[name]
-            between = np.subtract(carried.places[other], carried.places[one])
+            first, second = linkage.struts[name]
+            between = np.subtract(carried.places[second], carried.places[first])
             at_other, at_one = (
                 self.velocity(carried.carriers[carried.same[point]][0], carried.places[point])
-                for point in (other, one)
+                for point in (second, first)
             )
             along: Array = carried.size * between / np.linalg.norm(between)
             return np.asarray(along @ (at_other - at_one))
@@ -191,24 +191,24 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
     """Refuse a linkage that its inputs do not move, or that its steps do not find."""
     count = len(linkage.driven)
     degrees = f'degree{"s" * (freedom.mobility != 1)} of freedom'
-    given = f'{count} input{"s" * (count != 1)} for {freedom.mobility} {degrees}'
+    counts = f'{count} input{"s" * (count != 1)} for {freedom.mobility} {degrees}'
     free = [link for link in freedom.free if link in linkage.link_names]
     if free:
         # At a toggle equations are redundant that are needed elsewhere.
         away = 'draw a pose that is not at a toggle, ' if freedom.redundant else ''
         stay = 'stay' if len(free) > 1 else 'stays'
         raise DefinitionError(
-            'input', f'{given}: {list_names(free)} {stay} free',
+            'input', f'{counts}: {list_names(free)} {stay} free',
             f'{away}drive another joint, or hold what is free',
         )  # fmt: skip
     if freedom.dependent and not freedom.mobility:
         raise DefinitionError(
-            'input', f'{given}: the linkage is over-constrained, and cannot move',
+            'input', f'{counts}: the linkage is over-constrained, and cannot move',
             'let a hinge be a ball, or correct the axes and the places',
         )  # fmt: skip
     if freedom.dependent:
         raise DefinitionError(
-            'input', f'{given}: they depend on each other', 'leave one of them out'
+            'input', f'{counts}: they depend on each other', 'leave one of them out'
         )
     unknown = [
         link for link in linkage.link_names if link not in plan.frames and link not in plan.idle
@@ -235,9 +235,11 @@ def balls_of(linkage: SpaceLinkage, carried: CarriedPoints) -> Iterator[tuple[st
             if joined[0] != first:
                 yield point, first, joined[0]
             for link in joined:
-                found = [one for one in left if _is_on_hinge(linkage, carried, point, {link, one})]
-                joined += found
-                left = [one for one in left if one not in found]
+                on_hinge = [
+                    end for end in left if _is_on_hinge(linkage, carried, point, {link, end})
+                ]
+                joined += on_hinge
+                left = [end for end in left if end not in on_hinge]
 
 
 def _is_on_hinge(

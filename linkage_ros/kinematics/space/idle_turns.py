@@ -73,8 +73,8 @@ def hold_idle_turns(linkage: SpaceLinkage) -> IdleTurns:
     reach, still = MERGED * size_of(linkage), linkage
     one_with: dict[str, str] = {}
     rods: list[list[_IdleEnd]] = []
-    while found := next(_idle_turns(still, reach), None):
-        name, gone, balls = found
+    while idle := next(_idle_turns(still, reach), None):
+        name, gone, balls = idle
         _check_traced(still, name, gone, balls, reach)
         (kept,) = {still.hinges[name].parent, still.hinges[name].child} - {gone}
         one_with = {of: kept if on == gone else on for of, on in one_with.items()} | {gone: kept}
@@ -88,7 +88,9 @@ def hold_idle_turns(linkage: SpaceLinkage) -> IdleTurns:
         chains |= {*ball.hinges}
         point = free_name(f'{ball.link}_ball', points)
         points[point] = ball.place
-        for link in (one_with.get(each, each) for each in (ball.link, *ball.on)):
+        for link in (
+            one_with.get(link_before, link_before) for link_before in (ball.link, *ball.on)
+        ):
             links[link] = (*links.get(link, ()), point)
     hung = replace(still, points=points, links=links)
     hinges = {name: hinge for name, hinge in still.hinges.items() if name not in chains}
@@ -121,7 +123,9 @@ def _as_one(linkage: SpaceLinkage, name: str, gone: str, kept: str) -> SpaceLink
             for of, joint in joints.items()
             if of != name
         }
-        return {of: replace(joints[of], parent=one, child=two) for of, (one, two) in ends.items()}
+        return {
+            of: replace(joints[of], parent=parent, child=two) for of, (parent, two) in ends.items()
+        }
 
     links = dict(linkage.links)
     if points := links.pop(gone, ()):
@@ -151,7 +155,7 @@ def _rods(linkage: SpaceLinkage, reach: float) -> Iterator[list[_IdleEnd]]:
         ends, parts = list[_IdleEnd | None](), [first]
         for link in parts:
             for point in linkage.links.get(link, ()):
-                on = tuple(other for other in carriers[point] if other != link)
+                on = tuple(carrier for carrier in carriers[point] if carrier != link)
                 if point in moved:
                     ends.append(None)
                 elif on:
@@ -161,12 +165,12 @@ def _rods(linkage: SpaceLinkage, reach: float) -> Iterator[list[_IdleEnd]]:
                     ends.append(_end_at(linkage, joints, link, name, reach))
                 else:
                     slide = linkage.slides[name]
-                    parts += [one for one in (slide.parent, slide.child) if one not in parts]
-        found = [end for end in ends if end is not None]
-        is_held = len(found) == len(ends) == 2 and any(end.hinges for end in found)
+                    parts += [end for end in (slide.parent, slide.child) if end not in parts]
+        known_ends = [end for end in ends if end is not None]
+        is_held = len(known_ends) == len(ends) == 2 and any(end.hinges for end in known_ends)
         if is_held and seen.isdisjoint(parts):
             yield sorted(
-                found, key=lambda end: ((1, _OF_BALL, 0).index(len(end.hinges)), end.hinges)
+                known_ends, key=lambda end: ((1, _OF_BALL, 0).index(len(end.hinges)), end.hinges)
             )
         seen |= {*parts} - {GROUND}
 
@@ -244,7 +248,7 @@ def _hinge_to_hold(linkage: SpaceLinkage, balls: list[_IdleEnd]) -> str:
     for ball in balls:
         axes = {name: direction_of(linkage.hinges[name].axis) for name in ball.hinges}
         for name, axis in axes.items():
-            others = (other for of, other in axes.items() if of != name)
+            others = (axis for of, axis in axes.items() if of != name)
             fitness[name] = abs(dot(axis, rod)) * length(cross(*others))
     best = max(fitness.values(), default=0.0)
     return min((name for name, fit in fitness.items() if fit > best - _ALIKE), default='')

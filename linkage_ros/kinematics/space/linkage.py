@@ -173,7 +173,7 @@ class SpaceLinkage(JointedLinkage):
     def with_masses(
         self, masses: Mapping[str, SpatialMass], massless: Iterable[str]
     ) -> SpaceLinkage:
-        """Return the linkage with masses; beside them some links are massless."""
+        """Return the linkage with masses; some other links are massless."""
         weighed = replace(self, masses=masses)
         return replace(weighed, masses=weighed.masses_with(*massless))
 
@@ -205,13 +205,13 @@ class SpaceLinkage(JointedLinkage):
 
     def shared_points(self, *, on_axes: bool) -> Iterator[tuple[str, str, str]]:
         """Yield each point with the links that share it: on the axis of their hinge, or not."""
-        for one, other in combinations(self.links, 2):
-            axes = [h for h in self.hinges.values() if {h.parent, h.child} == {one, other}]
-            for name in self.links[one]:
-                if name in self.links[other] and on_axes is any(
+        for first, second in combinations(self.links, 2):
+            axes = [h for h in self.hinges.values() if {h.parent, h.child} == {first, second}]
+            for name in self.links[first]:
+                if name in self.links[second] and on_axes is any(
                     _distance_from_axis(self.points[name], hinge) <= ONE_PLACE for hinge in axes
                 ):
-                    yield name, one, other
+                    yield name, first, second
 
     @cached_property
     def holes(self) -> dict[tuple[str, str], Vector]:
@@ -222,17 +222,17 @@ class SpaceLinkage(JointedLinkage):
         place are a ball or a universal joint: its axes meet.
         """
         shared = {(end, name) for name, *ends in self.shared_points(on_axes=True) for end in ends}
-        found = {
+        places = {
             (link, name): self.points[name]
             for link, names in self.links.items()
             for name in names
             if (link, name) not in shared
         }
-        places = Counter(hinge.at for hinge in self.hinges.values())
+        hinges_at = Counter(hinge.at for hinge in self.hinges.values())
         for name, hinge in self.hinges.items():
-            if places[hinge.at] == 1:
-                found |= {(end, name): hinge.at for end in (hinge.parent, hinge.child)}
-        return found
+            if hinges_at[hinge.at] == 1:
+                places |= {(end, name): hinge.at for end in (hinge.parent, hinge.child)}
+        return places
 
     @cached_property
     def inputs(self) -> tuple[Input, ...]:
@@ -257,8 +257,8 @@ class SpaceLinkage(JointedLinkage):
     def pose_value(self, name: str) -> float:
         """Return the value of a joint in the pose, in [rad] or [m]."""
         if name in self.struts:
-            one, other = self.struts[name]
-            return dist(self.points[one], self.points[other])
+            first, second = self.struts[name]
+            return dist(self.points[first], self.points[second])
         return self.pair_joints[name].value
 
     def _as_input(self, name: str) -> Input:
@@ -296,7 +296,7 @@ def check_space_linkage(linkage: SpaceLinkage) -> None:
                     'name two links',
                 )  # fmt: skip
             if not isfinite(length(joint.axis)) or length(joint.axis) < 1e-100:
-                axis = ', '.join(f'{one:g}' for one in joint.axis)
+                axis = ', '.join(f'{component:g}' for component in joint.axis)
                 raise DefinitionError(
                     f'{kind}.{name}.axis', f'[{axis}] has no direction',
                     'write for example [0, 0, 1]',
@@ -322,8 +322,8 @@ def _check_held(linkage: SpaceLinkage) -> None:
         places = [linkage.points[point] for point in points]
         for number, place in enumerate(places):
             if place in places[:number]:
-                one, other = points[places.index(place)], points[number]
-                reason = f'{quote(one)} and {quote(other)} are in one place'
+                first, second = points[places.index(place)], points[number]
+                reason = f'{quote(first)} and {quote(second)} are in one place'
                 raise DefinitionError(f'links.{link}', reason, 'name points apart')
         if sum(carried[point] > 1 for point in points) < 2:
             remedy = (
@@ -335,8 +335,8 @@ def _check_held(linkage: SpaceLinkage) -> None:
                     'linkage gallery hexapod does'
                 )
             raise DefinitionError(f'links.{link}', 'is held by one ball at most, and free', remedy)
-    for name, (one, other) in linkage.struts.items():
-        for point in (one, other):
+    for name, (first, second) in linkage.struts.items():
+        for point in (first, second):
             if not carried[point]:
                 raise DefinitionError(
                     f'struts.{name}', f'no link carries {quote(point)}', 'name it under links'
@@ -353,12 +353,12 @@ def _check_joints(linkage: SpaceLinkage) -> None:
     check_inputs(linkage)
     check_ratios(linkage, linkage.pair_joints, 'hinge or slide', names)
     for name, ratio in linkage.ratios.items():
-        expected = ratio.value_at({each: linkage.pose_value(each) for each in ratio.terms})
-        found = linkage.pose_value(name)
-        if abs(expected - found) > 1e-9 * (1.0 + abs(expected)):
+        expected = ratio.value_at({term: linkage.pose_value(term) for term in ratio.terms})
+        value = linkage.pose_value(name)
+        if abs(expected - value) > 1e-9 * (1.0 + abs(expected)):
             raise DefinitionError(
                 f'ratios.{name}',
-                f'gives {expected:.6g} in the pose, where {quote(name)} is {found:.6g}',
+                f'gives {expected:.6g} in the pose, where {quote(name)} is {value:.6g}',
                 'write the offset that fits the pose',
             )
 
@@ -381,7 +381,7 @@ def size_of(linkage: SpaceLinkage) -> float:
 
 def extent_of(places: Iterable[Vector]) -> float:
     """Return the greatest extent of places along an axis of the ground."""
-    return max((max(one) - min(one) for one in zip(*places, strict=True)), default=0.0)
+    return max((max(row) - min(row) for row in zip(*places, strict=True)), default=0.0)
 
 
 def unit_of(linkage: SpaceLinkage) -> float:

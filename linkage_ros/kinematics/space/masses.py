@@ -51,11 +51,11 @@ class SpatialMass:
 MASSLESS = SpatialMass(0.0)
 
 
-def thin_rod(mass: float, one: Vector, other: Vector) -> SpatialMass:
+def thin_rod(mass: float, first: Vector, second: Vector) -> SpatialMass:
     """Return a uniform thin rod between two places, in [m]."""
-    center = scale(0.5, plus(one, other))
+    center = scale(0.5, plus(first, second))
     # Two halves of its mass a twelfth of its square apart from the centre, on either side.
-    return SpatialMass(mass, center, scale_tensor(mass / 12.0, _spread(minus(other, one))))
+    return SpatialMass(mass, center, scale_tensor(mass / 12.0, _spread(minus(second, first))))
 
 
 def combine_masses(parts: Sequence[SpatialMass]) -> SpatialMass:
@@ -124,6 +124,6 @@ def _spread(arm: Vector) -> Tensor:
     return y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y
 
 
-def _sum(one: Tensor, other: Tensor) -> Tensor:
-    xx, xy, xz, yy, yz, zz = (a + b for a, b in zip(one, other, strict=True))
+def _sum(first: Tensor, second: Tensor) -> Tensor:
+    xx, xy, xz, yy, yz, zz = (a + b for a, b in zip(first, second, strict=True))
     return xx, xy, xz, yy, yz, zz

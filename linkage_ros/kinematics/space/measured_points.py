@@ -46,7 +46,9 @@ def with_measured(linkage: SpaceLinkage, names: Sequence[str]) -> SpaceLinkage:
             linkage = _with_distance(linkage, name, pair)
         elif axis == 'angle' and of in linkage.link_names:
             own = [
-                one for one, joint in linkage.hinges.items() if of in (joint.parent, joint.child)
+                hinge
+                for hinge, joint in linkage.hinges.items()
+                if of in (joint.parent, joint.child)
             ]
             raise DefinitionError(
                 name, 'a link in space turns about more than one axis, and has no one angle',
@@ -66,10 +68,10 @@ def _with_coordinate(linkage: SpaceLinkage, name: str, point: str, axis: str) ->
         raise DefinitionError(name, f'{point} is a point of the ground', 'name one that moves')
     place = dict(zip(_AXES, linkage.points[point], strict=True))
     slides, before, carriers = dict(linkage.slides), GROUND, []
-    for one in (axis, *(other for other in _AXES if other != axis)):
-        link, slide = f'carrier along {one} of {name}', f'{one} of {name}'
-        slide = name if one == axis else slide
-        slides[slide] = SpatialJoint(before, link, _AXES[one], value=place[one])
+    for letter in (axis, *(letter for letter in _AXES if letter != axis)):
+        link, slide = f'carrier along {letter} of {name}', f'{letter} of {name}'
+        slide = name if letter == axis else slide
+        slides[slide] = SpatialJoint(before, link, _AXES[letter], value=place[letter])
         before = link
         carriers.append(link)
     return replace(

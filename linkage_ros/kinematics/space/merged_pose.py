@@ -47,8 +47,8 @@ def merge_pose(linkage: SpaceLinkage) -> SpaceLinkage:
     hinges = {name: _turn_axis(hinge, unit, places) for name, hinge in hinges.items()}
     moved: dict[Vector, Vector] = {}
     for hinge in hinges.values():
-        one, other = (linkage.links.get(end, ()) for end in (hinge.parent, hinge.child))
-        for place in {points[name] for name in set(one).intersection(other)}:
+        first, second = (linkage.links.get(end, ()) for end in (hinge.parent, hinge.child))
+        for place in {points[name] for name in set(first).intersection(second)}:
             now = moved.get(place, place)
             moved[place] = places.bring(now, _foot_on(hinge, now))
     if not places.largest:
@@ -85,14 +85,14 @@ class _Places:
 
     def merge(self, place: Vector, rounding: float = 0.0) -> Vector:
         """Return the place that a new one is merged with, if not by rounding; or itself."""
-        cell = tuple(one // self._bound for one in place)
-        for near in product(*((one - 1.0, one, one + 1.0) for one in cell)):
-            for other in self._cells.get(near, ()):
-                if (apart := dist(place, other)) < self._bound:
+        cell = tuple(coordinate // self._bound for coordinate in place)
+        for near in product(*((row - 1.0, row, row + 1.0) for row in cell)):
+            for near_place in self._cells.get(near, ()):
+                if (apart := dist(place, near_place)) < self._bound:
                     if apart <= rounding:
                         return place
                     self.largest = max(self.largest, apart)
-                    return other
+                    return near_place
         self._cells.setdefault(cell, []).append(place)
         return place
 

@@ -71,12 +71,12 @@ def closure_as_drawn(
 
 def _turns_in_pose(closure: PlanarClosure, linkage: SpaceLinkage) -> dict[str, int]:
     """Return for each joint the whole turns that its value lacks in the pose."""
-    found = closure.close_unlimited(*linkage.pose.inputs)
-    if not found.status.has_rates:
+    position = closure.close_unlimited(*linkage.pose.inputs)
+    if not position.status.has_rates:
         raise DefinitionError('pose', 'the linkage is at a toggle', 'draw another pose')
     return {
         name: round((linkage.pose_value(name) - value) / tau)
-        for name, value in zip(closure.joint_names, found.joints, strict=True)
+        for name, value in zip(closure.joint_names, position.joints, strict=True)
     }
 
 
@@ -93,11 +93,11 @@ def linkage_in_plane(linkage: SpaceLinkage) -> Linkage | None:
     return None
 
 
-def _in_plane(linkage: SpaceLinkage, found: PlanarLoop, axes: tuple[str, str]) -> Linkage | None:
+def _in_plane(linkage: SpaceLinkage, loop: PlanarLoop, axes: tuple[str, str]) -> Linkage | None:
     """Return the planar linkage, or None if it cannot say a joint's zero or a traced point."""
-    named = {point for points in found.linkage.links.values() for point in points}
-    has_own_zeroes = any(abs(offset) > _SAME_ZERO for offset in found.offsets.values())
+    named = {point for points in loop.linkage.links.values() for point in points}
+    has_own_zeroes = any(abs(offset) > _SAME_ZERO for offset in loop.offsets.values())
     if has_own_zeroes or not named.issuperset(linkage.traced):
         return None
-    planar = found.linkage
+    planar = loop.linkage
     return replace(planar, traced=linkage.traced, axes=axes, left_out=linkage.left_out)

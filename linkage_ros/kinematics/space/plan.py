@@ -256,14 +256,14 @@ class SpacePlan:
         for step in planar.steps:
             self.add_step(step)
         for name, joint in loop.linkage.joints.items():
-            one, other, factor, constant = planar.joint_term(joint)
+            first, second, factor, constant = planar.joint_term(joint)
             rest = loop.offsets[name]
             if not self._slides(name):
                 x = self.state.coordinates
-                off = x[one] - x[other] + constant + rest - self.pose_value(name)
+                off = x[first] - x[second] + constant + rest - self.pose_value(name)
                 rest -= tau * round(off / tau)
             self.coordinates[name] = self._joint_coordinate(
-                FollowerJoint(name, one, other, factor * constant, factor, rest)
+                FollowerJoint(name, first, second, factor * constant, factor, rest)
             )
         self.tilt = max(self.tilt, loop.tilt)
         by = list_names(loop.inputs)
@@ -367,7 +367,7 @@ class SpacePlan:
         self.coordinates[name] = len(self.state.coordinates)
         if factors.keys() <= self.turns_with.keys():
             turns = [
-                [factor * each for each in self.turns_with[of]] for of, factor in factors.items()
+                [factor * turn for turn in self.turns_with[of]] for of, factor in factors.items()
             ]
             self.turns_with[self.coordinates[name]] = tuple(map(fsum, zip(*turns, strict=True)))
         if ratio.also:
@@ -405,31 +405,31 @@ class SpacePlan:
             return True
         return False
 
-    def _direction(self, place: Vector, found: float, name: str) -> float:
-        """Return the direction of a place, with the turns of the pose; it gives `found` with 0."""
+    def _direction(self, place: Vector, near: float, name: str) -> float:
+        """Return the direction of a place, with the turns of the pose; it gives `near` with 0."""
         direction = atan2(place[1], place[0])
-        return direction + tau * round((found - direction - self.pose_value(name)) / tau)
+        return direction + tau * round((near - direction - self.pose_value(name)) / tau)
 
     def _distances(self, point: str) -> Iterator[_Pair]:
         """Yield the known points at known distances from a point."""
         for link in self.carriers[point]:
-            for other in self.carried[link]:
-                size = dist(self.places[point], self.places[other])
-                if other != point and size and self.is_known(other):
-                    yield _Pair(point, other, Rod(size), link)
+            for known in self.carried[link]:
+                size = dist(self.places[point], self.places[known])
+                if known != point and size and self.is_known(known):
+                    yield _Pair(point, known, Rod(size), link)
         for name, points in self.linkage.struts.items():
             ends = [self.same[end] for end in points]
             if name in self.coordinates and point in ends:
-                other = ends[1 - ends.index(point)]
-                if self.is_known(other):
-                    yield _Pair(point, other, Rod(0.0, self.coordinates[name]), name)
+                far_end = ends[1 - ends.index(point)]
+                if self.is_known(far_end):
+                    yield _Pair(point, far_end, Rod(0.0, self.coordinates[name]), name)
         for name, joint in self.linkage.slides.items():
             for link, beyond in ((joint.parent, joint.child), (joint.child, joint.parent)):
                 if name in self.coordinates and link in self.carriers[point]:
-                    for other in self.carried[beyond]:
-                        if other != point and self.is_known(other):
-                            way = (point, other) if link == joint.parent else (other, point)
-                            yield _Pair(point, other, self.slide_rod(name, *way), name)
+                    for known in self.carried[beyond]:
+                        if known != point and self.is_known(known):
+                            way = (point, known) if link == joint.parent else (known, point)
+                            yield _Pair(point, known, self.slide_rod(name, *way), name)
 
     def slide_rod(self, slide: str, start: str, end: str) -> Rod:
         """Return the distance of a point of a slide's parent to one of its child."""
@@ -475,8 +475,8 @@ class SpacePlan:
         trial = LinkState([*self.state.coordinates], [*self.state.pins])
         if isinstance(joint, HingePair) and step.close(trial).status.has_pose:
             # Where 0 lies among the whole turns follows from the value in the pose.
-            found = trial.coordinates[-1]
-            step = replace(step, direction=self._direction(place, found, name))
+            value = trial.coordinates[-1]
+            step = replace(step, direction=self._direction(place, value, name))
         self.add_step(step)
         method = f'{name}, on {ends[0]}, by {by} from {known} to {point}'
         self.end_group('closed', (ends[1],), method, side)
@@ -509,10 +509,10 @@ class SpacePlan:
         known = list(filter(self.is_known, self.carried[link]))
         for names in combinations(known, 3):
             start, *ends = (self.places[name] for name in names)
-            one, other = (minus(end, start) for end in ends)
-            if length(cross(one, other)) > 1e-3 * length(one) * length(other):
+            first, second = (minus(end, start) for end in ends)
+            if length(cross(first, second)) > 1e-3 * length(first) * length(second):
                 indices = tuple(map(self.point_index, names))
-                index = self._set_frame(link, frame_of(start, one, other))
+                index = self._set_frame(link, frame_of(start, first, second))
                 self.add_step(FramedLink((indices[0], indices[1], indices[2]), index))
                 self.end_group('framed', (link,), f'by points {list_names(names)}')
                 return True
@@ -581,16 +581,16 @@ class SpacePlan:
 
     def _translate(self, link: str) -> bool:
         """Place a link that hangs on three slides: it does not turn, and so is one point."""
-        found = self._slide_chain(link)
-        if found is None or len(found[1]) != 3 or not self.carried[link]:
+        chain_found = self._slide_chain(link)
+        if chain_found is None or len(chain_found[1]) != 3 or not self.carried[link]:
             return False
-        root, chain = found
+        root, chain = chain_found
         point = self.carried[link][0]
         pairs, shifts = [], {}
-        for other in self.carried[link]:
-            for pair in self._distances(other):
+        for carried in self.carried[link]:
+            for pair in self._distances(carried):
                 pairs.append(pair)
-                shifts[pair] = (root, minus(self.places[point], self.places[other]))
+                shifts[pair] = (root, minus(self.places[point], self.places[carried]))
         if not self._meet(point, pairs, shifts):
             return False
         self._add_resolved(tuple(chain), root, self.points[point], self.places[point])
@@ -633,9 +633,9 @@ class SpacePlan:
                 if not all(map(self.is_known, ends)):
                     self.lost.append(name)
                     continue
-                one, other = map(self.point_index, ends)
+                first, second = map(self.point_index, ends)
                 self.coordinates[name] = len(self.state.coordinates)
-                step = MeasuredStrut((one, other), self.coordinates[name])
+                step = MeasuredStrut((first, second), self.coordinates[name])
                 self.add_step(step)
             else:
                 joint = linkage.pair_joints[name]
@@ -681,8 +681,8 @@ class SpacePlan:
             return {name: 1.0} if name in self.linkage.driven and not self._slides(name) else {}
         totals: dict[str, float] = {}
         for of, ratio in self.linkage.ratios[name].terms.items():
-            for given, factor in self._factors_of_inputs(of).items():
-                totals[given] = totals.get(given, 0.0) + ratio * factor
+            for name_of_input, factor in self._factors_of_inputs(of).items():
+                totals[name_of_input] = totals.get(name_of_input, 0.0) + ratio * factor
         return totals
 
 
@@ -690,9 +690,9 @@ def _dual_basis(axes: list[Vector]) -> list[Vector]:
     """Return the vectors whose scalar product with one axis is 1, and with the others 0."""
     if len(axes) == 1:
         return axes
-    one, other, third = axes
-    volume = dot(one, cross(other, third))
+    first, second, third = axes
+    volume = dot(first, cross(second, third))
     return [
         drop_rounding(scale(1.0 / volume, cross(*two)))
-        for two in ((other, third), (third, one), (one, other))
+        for two in ((second, third), (third, first), (first, second))
     ]

@@ -79,7 +79,7 @@ class PlanarLoop(NamedTuple):
     @property
     def inputs(self) -> tuple[str, ...]:
         """Return the names of the joints that move it."""
-        return tuple(given.joint for given in self.linkage.inputs)
+        return tuple(driven.joint for driven in self.linkage.inputs)
 
 
 class _FlatJoints(NamedTuple):
@@ -124,13 +124,13 @@ def _normals(linkage: SpaceLinkage, carried: CarriedPoints) -> list[Vector]:
     normals: list[Vector] = []
     for name in linkage.hinges:
         axis = carried.axes[name]
-        if not any(_is_parallel(axis, other) for other in normals):
+        if not any(_is_parallel(axis, normal) for normal in normals):
             normals.append(scale(-1.0 if max(axis, key=abs) < 0.0 else 1.0, axis))
     return normals
 
 
-def _is_parallel(one: Vector, other: Vector) -> bool:
-    return length(cross(one, other)) < PARALLEL
+def _is_parallel(first: Vector, second: Vector) -> bool:
+    return length(cross(first, second)) < PARALLEL
 
 
 def _joints_across(linkage: SpaceLinkage, carried: CarriedPoints, normal: Vector) -> Edges:
@@ -164,14 +164,14 @@ def _rods_across(
         edges |= ends if len(ends) > 1 else {}
     for name, pair in linkage.struts.items():
         points = [carried.same[point] for point in pair]
-        one, other = (carried.places[point] for point in points)
-        if name in known and abs(dot(minus(other, one), normal)) < MERGED:
+        start, end = (carried.places[point] for point in points)
+        if name in known and abs(dot(minus(end, start), normal)) < MERGED:
             edges |= {f'{name}, {point}': (name, held[point]) for point in points}
     return edges
 
 
 def _balls(linkage: SpaceLinkage, rods: Collection[str]) -> Iterator[tuple[str, list[str]]]:
-    """Yield the points that several links carry, with those of them that are no rods."""
+    """Yield the points that several links carry, with those of them that are not rods."""
     for point in linkage.points:
         links = [
             link
@@ -199,13 +199,13 @@ def biconnected_components(edges: Edges, order: Collection[str]) -> list[Edges]:
     ``order`` has the vertices in the order in which they are taken as roots.
     """
     near: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
-    for edge, (one, other) in edges.items():
-        near[one].append((edge, other))
-        near[other].append((edge, one))
+    for edge, (behind, ahead) in edges.items():
+        near[behind].append((edge, ahead))
+        near[ahead].append((edge, behind))
     depth: dict[str, int] = {}
     low: dict[str, int] = {}
-    found: list[Edges] = []
-    for root in (one for one in order if one in near):
+    components: list[Edges] = []
+    for root in (vertex for vertex in order if vertex in near):
         if root in depth:
             continue
         depth[root] = low[root] = len(depth)
@@ -221,18 +221,18 @@ def biconnected_components(edges: Edges, order: Collection[str]) -> list[Edges]:
                     low[top] = min(low[top], low[at])
                     if low[at] >= depth[top]:
                         first = waiting.index(by)
-                        found.append({edge: edges[edge] for edge in waiting[first:]})
+                        components.append({edge: edges[edge] for edge in waiting[first:]})
                         del waiting[first:]
                 continue
-            edge, other = way
-            if other not in depth:
-                depth[other] = low[other] = len(depth)
+            edge, ahead = way
+            if ahead not in depth:
+                depth[ahead] = low[ahead] = len(depth)
                 waiting.append(edge)
-                path.append((other, edge, iter(near[other])))
-            elif edge != by and depth[other] < depth[at]:
+                path.append((ahead, edge, iter(near[ahead])))
+            elif edge != by and depth[ahead] < depth[at]:
                 waiting.append(edge)
-                low[at] = min(low[at], depth[other])
-    return [component for component in found if len(component) > 2]
+                low[at] = min(low[at], depth[ahead])
+    return [component for component in components if len(component) > 2]
 
 
 class _Pin(NamedTuple):
@@ -321,13 +321,14 @@ class PlanarModel:
                 name = edge.removeprefix(f'{ends[0]}, ')
                 place = scale(self._carried.size, self._carried.places[name])
             pin = _Pin(name, self._flat(place), held)
-            for other in [*pins]:
-                if other.name == name or (
-                    dist(other.place, pin.place) < self._near and not held.isdisjoint(other.links)
+            for near_pin in [*pins]:
+                if near_pin.name == name or (
+                    dist(near_pin.place, pin.place) < self._near
+                    and not held.isdisjoint(near_pin.links)
                 ):
-                    pins.remove(other)
-                    held = held | other.links
-                    pin = _Pin(other.name, other.place, held)
+                    pins.remove(near_pin)
+                    held = held | near_pin.links
+                    pin = _Pin(near_pin.name, near_pin.place, held)
             pins.append(pin)
         return pins
 
@@ -408,7 +409,7 @@ class PlanarModel:
         x, y = self._flat(weighed.center)
         center = _turn((x - first[0], y - first[1]), -angle) if weighed.mass else (0.0, 0.0)
         across = (dot(row, self._normal) for row in tensor_rows(weighed.inertia))
-        about = sum(one * other for one, other in zip(self._normal, across, strict=True))
+        about = sum(first * second for first, second in zip(self._normal, across, strict=True))
         return Mass(weighed.mass, center, about)
 
     def _add_points(self, there: dict[str, Point], names: Collection[str]) -> None:
@@ -433,13 +434,13 @@ class PlanarModel:
             x, y = _turn(arm, _OPENED)
             moved[pin.name] = (pivot.place[0] + x, pivot.place[1] + y)
             cranks.append((crank, arm))
-        (one, arm), (other, other_arm) = cranks
+        (first, arm), (second, other_arm) = cranks
         if dist(arm, other_arm) > PARALLEL * hypot(*arm):
             return pose
-        turn = {one: _OPENED, other: _OPENED}
+        turn = {first: _OPENED, second: _OPENED}
         values = (
-            value + turn.get(given.child, 0.0) - turn.get(given.parent, 0.0)
-            for value, given in zip(pose.inputs, inputs, strict=True)
+            value + turn.get(driven.child, 0.0) - turn.get(driven.parent, 0.0)
+            for value, driven in zip(pose.inputs, inputs, strict=True)
         )
         angles = {link: angle + turn.get(link, 0.0) for link, angle in pose.angles.items()}
         return AssemblyPose(tuple(values), moved, angles)

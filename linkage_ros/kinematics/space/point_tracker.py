@@ -81,7 +81,7 @@ class RodAxis(NamedTuple):
         return dot(minus(place, self.start), along) / dot(along, along)
 
     def distance(self, place: Vector) -> float:
-        """Return how far a place is beside the axis, in the unit of the places."""
+        """Return how far a place is from the axis, in the unit of the places."""
         along = scale(self.share(place), minus(self.end, self.start))
         return length(minus(place, plus(self.start, along)))
 
@@ -129,7 +129,8 @@ class SpatialTracker:
         pins, rates = position.state.pins, velocity.state.pins
         return [
             scale(
-                self._scale, _interpolate(share, *(one.velocity(pins, rates) for one in anchors))
+                self._scale,
+                _interpolate(share, *(anchor.velocity(pins, rates) for anchor in anchors)),
             )
             for share, anchors in self._points
         ]
@@ -145,7 +146,8 @@ class SpatialTracker:
         states = position.state.pins, velocity.state.pins, acceleration.state.pins
         return [
             scale(
-                self._scale, _interpolate(share, *(one.acceleration(*states) for one in anchors))
+                self._scale,
+                _interpolate(share, *(anchor.acceleration(*states) for anchor in anchors)),
             )
             for share, anchors in self._points
         ]
@@ -196,10 +198,10 @@ class SpatialTracker:
 def rod_axis(plan: SpacePlan, link: str) -> RodAxis:
     """Return the axis of a rod that may spin, in the pose and in the unit of the plan."""
     places = plan.places
-    one, other = max(
+    first, second = max(
         combinations(plan.carried[link], 2), key=lambda ends: dist(*(places[end] for end in ends))
     )
-    return RodAxis((one, other), places[one], places[other])
+    return RodAxis((first, second), places[first], places[second])
 
 
 def _divide(
@@ -213,8 +215,8 @@ def _divide(
 
 
 def _ends(plan: SpacePlan, axis: RodAxis) -> tuple[_Anchor, _Anchor]:
-    one, other = (_anchor(plan, end) for end in axis.ends)
-    return one, other
+    first, second = (_anchor(plan, end) for end in axis.ends)
+    return first, second
 
 
 def _anchor(plan: SpacePlan, point: str) -> _Anchor:
@@ -224,8 +226,8 @@ def _anchor(plan: SpacePlan, point: str) -> _Anchor:
     return _Anchor(plan.frames[link], plan.pose_frames[link].locate(plan.places[point]))
 
 
-def _interpolate(share: float, one: Vector, other: Vector | None = None) -> Vector:
+def _interpolate(share: float, first: Vector, second: Vector | None = None) -> Vector:
     """Return a vector that is a share of the way from one to another; one if it is alone."""
-    if other is None:
-        return one
-    return plus(scale(1.0 - share, one), scale(share, other))
+    if second is None:
+        return first
+    return plus(scale(1.0 - share, first), scale(share, second))

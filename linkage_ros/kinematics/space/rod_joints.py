@@ -99,8 +99,8 @@ def _reach(reached: set[str], linkage: SpaceLinkage) -> set[str]:
 def _hang(linkage: SpaceLinkage, link: str, point: str, reached: set[str]) -> SpaceLinkage:
     """Return the linkage with a link on hinges at a point that a link among others carries."""
     places, points = linkage.points, linkage.links[link]
-    on = next(one for one in linkage.links if one in reached and point in linkage.links[one])
-    arms = [minus(places[other], places[point]) for other in points if other != point]
+    on = next(link for link in linkage.links if link in reached and point in linkage.links[link])
+    arms = [minus(places[name], places[point]) for name in points if name != point]
     way = direction_of(arms[0])
     across = _direction_across(way)
     axes = [across, cross(way, across)]
@@ -112,9 +112,9 @@ def _hang(linkage: SpaceLinkage, link: str, point: str, reached: set[str]) -> Sp
         name = free_name(f'{link}_joint{number + 1}', (*hinges, *linkage.slides))
         hinges[name] = SpatialJoint(*ends, axes[number], places[point])
     # The hinges are there instead of the ball.
-    left = tuple(other for other in points if other != point)
+    left = tuple(name for name in points if name != point)
     return replace(linkage, hinges=hinges, links={**linkage.links, link: left})
 
 
 def _direction_across(way: Vector) -> Vector:
-    return direction_of(max((cross(way, one) for one in GROUND_FRAME[:3]), key=length))
+    return direction_of(max((cross(way, axis) for axis in GROUND_FRAME[:3]), key=length))

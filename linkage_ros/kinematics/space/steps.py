@@ -155,7 +155,7 @@ def meet_circle(radius: float, distance: float, height: float, rod: float) -> Ci
     Return how a circle and a rod meet, by the roots in the formula of the module.
 
     Their squares add up to 4·r·d. The greater one is what the smaller one leaves of it: so what is
-    rounded is the place on the circle, and no point beside the circle is found.
+    rounded is the place on the circle, and no point off the circle is found.
     """
     low = reach_between(rod, hypotenuse(height, subtract(distance, radius)))
     high = reach_between(hypotenuse(height, add(distance, radius)), rod)
@@ -445,44 +445,44 @@ class FramedLink(Step):
 
     def close(self, solved: LinkState) -> StepPose:
         """Append the frame."""
-        start, one, other = self._edges(solved)
-        solved.pins.append(frame_of(start, one, other))
+        start, first, second = self._edges(solved)
+        solved.pins.append(frame_of(start, first, second))
         return PLACED
 
     def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
         """Append the motion."""
-        start, one, other = self._edges(velocities)
-        velocities.pins.append(Twist(self._spin(solved, one, other), start))
+        start, first, second = self._edges(velocities)
+        velocities.pins.append(Twist(self._spin(solved, first, second), start))
 
     def accelerations(
         self, _pose: Any, _rates: Any, solved: LinkState, velocities: LinkState, changes: LinkState
     ) -> None:
         """Append the derivative of the motion."""
-        start, one, other = self._edges(changes)
+        start, *edges = self._edges(changes)
         spin = velocities.pins[self.link].spin
         _, first, second = self._edges(velocities)
-        one, other = minus(one, cross(spin, first)), minus(other, cross(spin, second))
-        changes.pins.append(Twist(self._spin(solved, one, other), start))
+        turns = (minus(e, cross(spin, v)) for e, v in zip(edges, (first, second), strict=True))
+        changes.pins.append(Twist(self._spin(solved, *turns), start))
 
     def _edges(self, state: LinkState) -> tuple[Vector, Vector, Vector]:
-        start, one, other = (state.pins[index] for index in self.points)
-        return start, minus(one, start), minus(other, start)
+        start, first, second = (state.pins[index] for index in self.points)
+        return start, minus(first, start), minus(second, start)
 
-    def _spin(self, solved: LinkState, one: Vector, other: Vector) -> Vector:
+    def _spin(self, solved: LinkState, first: Vector, second: Vector) -> Vector:
         """Return ω from the derivatives ω × a and ω × b of the two edges a and b."""
         _, a, b = self._edges(solved)
         normal = cross(a, b)
         spin = plus(
-            minus(scale(dot(other, normal), a), scale(dot(one, normal), b)),
-            scale(dot(one, b), normal),
+            minus(scale(dot(second, normal), a), scale(dot(first, normal), b)),
+            scale(dot(first, b), normal),
         )
         return scale(1.0 / dot(normal, normal), spin)
 
 
-def frame_of(origin: Vector, one: Vector, other: Vector) -> SpaceFrame:
+def frame_of(origin: Vector, first: Vector, second: Vector) -> SpaceFrame:
     """Return the frame with x along an edge, and y on the side of another."""
-    x = scale(1.0 / length(one), one)
-    up = cross(x, other)
+    x = scale(1.0 / length(first), first)
+    up = cross(x, second)
     z = scale(1.0 / length(up), up)
     return SpaceFrame(x, cross(z, x), z, origin)
 
@@ -534,7 +534,7 @@ class ResolvedSlides(Step):
     def close(self, solved: LinkState) -> StepPose:
         """Append the slides."""
         offset = minus(solved.pins[self.link].locate(solved.pins[self.point]), self.start)
-        solved.coordinates.extend(dot(one, offset) for one in self.directions)
+        solved.coordinates.extend(dot(direction, offset) for direction in self.directions)
         return PLACED
 
     def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> Vector:
@@ -556,7 +556,7 @@ class ResolvedSlides(Step):
 
     def _append_resolved(self, solved: LinkState, state: LinkState, vector: Vector) -> None:
         turned = solved.pins[self.link].resolve(vector)
-        state.coordinates.extend(dot(one, turned) for one in self.directions)
+        state.coordinates.extend(dot(direction, turned) for direction in self.directions)
 
 
 @dataclass(frozen=True, slots=True)
@@ -588,5 +588,5 @@ class MeasuredStrut(Step):
         changes.coordinates.append(add(pull, dot(across, across)) / size)
 
     def _strut_vector(self, state: LinkState) -> Vector:
-        one, other = (state.pins[index] for index in self.points)
-        return minus(other, one)
+        first, second = (state.pins[index] for index in self.points)
+        return minus(second, first)

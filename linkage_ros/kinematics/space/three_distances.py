@@ -71,9 +71,9 @@ class MetPose(NamedTuple):
         along = sides[0] / square
         beside = subtract(sides[1], along * self.along)
         up = subtract(sides[2], add(x * sides[0], y * square * beside)) / z
-        one, other, last = self.ways
-        across = plus(scale(beside / area_square, other), scale(up / area_square, last))
-        return plus(scale(along, one), across)
+        first, second, last = self.ways
+        across = plus(scale(beside / area_square, second), scale(up / area_square, last))
+        return plus(scale(along, first), across)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +98,11 @@ class ThreeDistances(Step):
         if missing is not None:
             return MetPose(Status.OPEN, missing)
         start, end, third = (solved.pins[index] for index in self.to)
-        one, other, rod = (each.length(solved) for each in self.rods)
+        first, second, rod = (rod.length(solved) for rod in self.rods)
         line, across, beyond = minus(end, start), minus(third, start), minus(third, end)
         square, twice = dot(line, line), dot(plus(across, beyond), line)
         size = sqrt(square)
-        for reach in (reach_between(one + other, size), reach_between(size, one - other)):
+        for reach in (reach_between(first + second, size), reach_between(size, first - second)):
             if reach.status is not Status.CLOSED:
                 # On the line P0 P1 the point has no side, and the third rod hardly ever fits.
                 return MetPose(Status.OPEN, reach.missing)
@@ -114,12 +114,12 @@ class ThreeDistances(Step):
         area = sqrt(area_square)
         distance = area / size
         # In units of P0 P1, along it from its middle: of P1 and a P2 next to it nothing cancels.
-        off = 0.5 * ((one - other) * (one + other)) / square
+        off = 0.5 * ((first - second) * (first + second)) / square
         height = subtract(0.5 * twice / square, off)
         foot, rest = 0.5 + off, off - 0.5
         # By the shorter rod: so what is rounded is the place on its sphere.
-        short = one < other
-        reach = reach_between(where(short, one, other), size * abs(where(short, foot, rest)))
+        short = first < second
+        reach = reach_between(where(short, first, second), size * abs(where(short, foot, rest)))
         if reach.status is not Status.CLOSED:
             return MetPose(Status.OPEN, reach.missing)
         radius = sqrt(reach.square)

@@ -80,42 +80,46 @@ STILL = Twist(ZERO, ZERO)
 
 
 def is_zero(number: float) -> bool:
-    """Return whether a number is a 0 that is no symbol."""
+    """Return whether a number is a 0 that is not a symbol."""
     return type(number) is float and number == 0.0
 
 
 # The next three are called most of all: what `is_zero` says is written out in them.
 
 
-def multiply(one: float, other: float) -> float:
+def multiply(first: float, second: float) -> float:
     """Return a product; 0 without an operation if a factor is 0."""
-    if (type(one) is float and one == 0.0) or (type(other) is float and other == 0.0):
+    if (type(first) is float and first == 0.0) or (type(second) is float and second == 0.0):
         return 0.0
-    return one * other
+    return first * second
 
 
-def add(one: float, other: float) -> float:
+def add(first: float, second: float) -> float:
     """Return a sum; without an operation if a term is 0."""
-    if type(one) is float and one == 0.0:
-        return other
-    return one if type(other) is float and other == 0.0 else one + other
+    if type(first) is float and first == 0.0:
+        return second
+    return first if type(second) is float and second == 0.0 else first + second
 
 
-def subtract(one: float, other: float) -> float:
+def subtract(first: float, second: float) -> float:
     """Return a difference; without a subtraction if a term is 0."""
-    if type(other) is float and other == 0.0:
-        return one
-    return -other if type(one) is float and one == 0.0 else one - other
+    if type(second) is float and second == 0.0:
+        return first
+    return -second if type(first) is float and first == 0.0 else first - second
 
 
-def plus(one: Vector, other: Vector) -> Vector:
+def plus(first: Vector, second: Vector) -> Vector:
     """Return the sum of two vectors."""
-    return add(one[0], other[0]), add(one[1], other[1]), add(one[2], other[2])
+    return add(first[0], second[0]), add(first[1], second[1]), add(first[2], second[2])
 
 
-def minus(one: Vector, other: Vector) -> Vector:
+def minus(first: Vector, second: Vector) -> Vector:
     """Return the difference of two vectors."""
-    return subtract(one[0], other[0]), subtract(one[1], other[1]), subtract(one[2], other[2])
+    return (
+        subtract(first[0], second[0]),
+        subtract(first[1], second[1]),
+        subtract(first[2], second[2]),
+    )
 
 
 def scale(factor: float, vector: Vector) -> Vector:
@@ -123,26 +127,26 @@ def scale(factor: float, vector: Vector) -> Vector:
     return multiply(factor, vector[0]), multiply(factor, vector[1]), multiply(factor, vector[2])
 
 
-def dot(one: Vector, other: Vector) -> float:
+def dot(first: Vector, second: Vector) -> float:
     """Return the scalar product of two vectors."""
-    return add(add(multiply(one[0], other[0]), multiply(one[1], other[1])),
-               multiply(one[2], other[2]))  # fmt: skip
+    return add(add(multiply(first[0], second[0]), multiply(first[1], second[1])),
+               multiply(first[2], second[2]))  # fmt: skip
 
 
-def cross(one: Vector, other: Vector) -> Vector:
+def cross(first: Vector, second: Vector) -> Vector:
     """Return the cross product of two vectors."""
     return (
-        subtract(multiply(one[1], other[2]), multiply(one[2], other[1])),
-        subtract(multiply(one[2], other[0]), multiply(one[0], other[2])),
-        subtract(multiply(one[0], other[1]), multiply(one[1], other[0])),
+        subtract(multiply(first[1], second[2]), multiply(first[2], second[1])),
+        subtract(multiply(first[2], second[0]), multiply(first[0], second[2])),
+        subtract(multiply(first[0], second[1]), multiply(first[1], second[0])),
     )
 
 
-def hypotenuse(one: float, other: float) -> float:
+def hypotenuse(first: float, second: float) -> float:
     """Return the length of a vector of two coordinates, which compiled code has a form of."""
-    if is_zero(one) or is_zero(other):
-        return abs(add(one, other))
-    return abs(make_vector(one, other))
+    if is_zero(first) or is_zero(second):
+        return abs(add(first, second))
+    return abs(make_vector(first, second))
 
 
 def length(vector: Vector) -> float:
@@ -152,7 +156,7 @@ def length(vector: Vector) -> float:
 
 def drop_rounding(vector: Vector) -> Vector:
     """Return a vector without the components that are rounding, and with exact axes."""
-    x, y, z = (0.0 if abs(one) < _ROUNDING else one for one in vector)
+    x, y, z = (0.0 if abs(component) < _ROUNDING else component for component in vector)
     return x, y, z
 
 

@@ -357,11 +357,11 @@ def _find_stops(closure: Closure, start: float, margin: float) -> tuple[float, f
     """Return the stops of the input, in [rad] or [m]: at limits, or before a toggle."""
     # If the input has limits, its angle is not reduced by whole turns.
     counted = closure.linkage.inputs[0].limits.is_bounded
-    for interval in closure.input_ranges:
-        if interval.is_whole:
+    for span in closure.input_ranges:
+        if span.is_whole:
             return -inf, inf
-        turns = 0.0 if counted else interval.shift(start)
-        low, high = interval.lowest - turns, interval.highest - turns
+        turns = 0.0 if counted else span.shift(start)
+        low, high = span.lowest - turns, span.highest - turns
         within = margin * (high - low)
         low, high = (
             (end if by else end + inwards) if limited else copy
@@ -369,8 +369,8 @@ def _find_stops(closure: Closure, start: float, margin: float) -> tuple[float, f
                 (low, high),
                 (within, -within),
                 (-inf, inf),
-                interval.limited,
-                interval.by,
+                span.limited,
+                span.by,
                 strict=True,
             )
         )

@@ -117,7 +117,7 @@ class Effect(ABC):
         return False
 
     def needs_here(self, _named: Collection[str], *, moves_by_rates: bool) -> tuple[str, ...]:
-        """Return the effects that it starts from, without the named ones of its scene."""
+        """Return the effects that it starts from in a scene with the named ones."""
         return self.needs
 
     @property

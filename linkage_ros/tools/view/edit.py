@@ -120,13 +120,9 @@ def pin_of(error: LinkageError, text: str) -> str | None:
     return next((part for part in reversed(str(where).split('.')) if part in names), None)
 
 
-def _shown_linkage(closure: PlanarClosure, inputs_sent: Any) -> _ShownLinkage:
+def _shown_linkage(closure: PlanarClosure, sent: Any) -> _ShownLinkage:
     count = len(closure.linkage.inputs)
-    inputs = (
-        _default_inputs(closure)
-        if inputs_sent is None
-        else read_numbers('inputs', inputs_sent, count)
-    )
+    inputs = _default_inputs(closure) if sent is None else read_numbers('inputs', sent, count)
     position = closure.position(*inputs)
     if not position.status.has_pose:
         inputs = _default_inputs(closure)

@@ -13,7 +13,6 @@ The reference is the textbook's four-bar: a spring on the rocker has the lever �
 θ3) / (c·sin(θ4 − θ3)) (R. L. Norton, Design of Machinery, ch. 6), which is 0 at a dead centre.
 """
 
-from cmath import phase, rect
 from math import acos, pi, sin
 import re
 
@@ -21,9 +20,10 @@ from linkage_ros.errors import FileError
 import numpy as np
 import pytest
 
+from ...support.four_bar import four_bar_angles, GALLERY
 from ...support.scenes import four_bar_text, pipeline_of
 
-LENGTHS = a, b, c, d = 0.04, 0.12, 0.08, 0.1
+LENGTHS = a, b, c, d = GALLERY
 DEAD_CENTRE = acos(((a + b) ** 2 + d**2 - c**2) / (2.0 * (a + b) * d))
 """Crank and coupler in line, stretched: the rocker stands still."""
 SMALL = 1e-12
@@ -33,10 +33,7 @@ INERTIA = 1e-3
 
 def lever(crank):
     """Return the rate of the rocker at a crank rate of 1."""
-    diagonal = d - rect(a, crank)
-    s = abs(diagonal)
-    coupler = phase(diagonal) + acos((b * b + s * s - c * c) / (2.0 * b * s))
-    rocker = phase(rect(a, crank) + rect(b, coupler) - d)
+    coupler, rocker = four_bar_angles(crank)
     return a * sin(crank - coupler) / (c * sin(rocker - coupler))
 
 

@@ -17,6 +17,8 @@ from typing import NamedTuple
 
 from mpmath import MPContext
 
+from ...support.four_bar import meeting_point
+
 mp = MPContext()
 mp.dps = 30
 mpc, mpf = mp.mpc, mp.mpf
@@ -53,11 +55,9 @@ class FourBar:
     def angles(self, t):
         """Return the angles of crank, coupler and rocker at a time: B is left of A→O4."""
         theta = self.crank(t)
-        diagonal = self.d - self.a * turn(theta)
-        s = abs(diagonal)
-        phi = mp.arg(diagonal) + mp.acos((self.b**2 + s**2 - self.c**2) / (2 * self.b * s))
-        psi = mp.arg(self.a * turn(theta) + self.b * turn(phi) - self.d)
-        return theta, phi, psi
+        at_a = self.a * turn(theta)
+        at_b = meeting_point(at_a, self.d, self.b, self.c)
+        return theta, mp.arg(at_b - at_a), mp.arg(at_b - self.d)
 
     def centers(self, t):
         turns = [turn(angle) for angle in self.angles(t)]

@@ -19,6 +19,7 @@ import pytest
 
 from .four_bar_by_hand import FourBar
 from .loaded import GRAVITY
+from ...support.four_bar import meeting_point
 from ...support.messages import read_joint_state, STORE
 from ...support.scenes import LINKAGES, pipeline_of, shipped
 
@@ -43,11 +44,8 @@ def circle(angle, radius):
 
 def four_bar(q):
     a, b, c, d = (mpf(x) / 1000 for x in (40, 120, 80, 100))
-    at_a = circle(q, a)
-    s = abs(d - at_a)
-    to_b = mp.arg(d - at_a) + mp.acos((b * b + s * s - c * c) / (2 * b * s))
-    rocker = at_a + circle(to_b, b) - d
-    return to_b - q, mp.arg(rocker)
+    at_b = meeting_point(circle(q, a), d, b, c)
+    return mp.arg(at_b - circle(q, a)) - q, mp.arg(at_b - d)
 
 
 def slider_crank(q):

@@ -9,9 +9,11 @@
 """Four-bars with compass and ruler: circles that meet, and positions that are known from it."""
 
 from cmath import phase, rect
-from math import pi, radians, sqrt
+from math import pi, radians
 
 from linkage_ros.tools.design import Assembly, Design, DesignRequest, FourBar
+
+from ...support.four_bar import meeting_point
 
 Lengths = tuple[float, float, float, float]
 """Of crank, coupler, rocker and ground."""
@@ -24,15 +26,8 @@ def cross(one: complex, other: complex) -> float:
 def pins(lengths: Lengths, direction: float) -> list[complex] | None:
     """Return where B can be, left of A→O4 first; O2 is the origin and O4 lies on the x axis."""
     a, b, c, d = lengths
-    crank_pin = rect(a, direction)
-    across = d - crank_pin
-    s = abs(across)
-    along = (s * s + b * b - c * c) / (2.0 * s)
-    square = b * b - along * along
-    if square < 0.0:
-        return None
-    foot, height = crank_pin + across / s * along, across / s * 1j * sqrt(square)
-    return [foot + height, foot - height]
+    found = [meeting_point(rect(a, direction), d, b, c, side) for side in (1, -1)]
+    return None if None in found else found
 
 
 def on(side: Assembly, lengths: Lengths, direction: float) -> complex:

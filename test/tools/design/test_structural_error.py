@@ -11,7 +11,7 @@
 from cmath import exp, phase
 from collections.abc import Callable
 from dataclasses import replace
-from math import acos, isnan, pi, radians, remainder, sqrt, tau
+from math import isnan, pi, radians, remainder, sqrt, tau
 
 from hypothesis import assume, given, strategies as st
 from linkage_ros.errors import SynthesisError
@@ -40,6 +40,7 @@ from scipy.optimize import minimize
 
 from . import by_hand
 from .test_function import task_of, TASKS
+from ...support.four_bar import meeting_point
 
 # The structural error of a design equals that of the same four-bar by compass and ruler.
 
@@ -89,11 +90,7 @@ class Generated:
         return r0 + (y - y0) / (y1 - y0) * (r1 - r0)
 
     def error(self, theta: mp.mpf) -> mp.mpf:
-        across = 1 - self.a * mp.expj(theta)
-        s = abs(across)
-        along = (s**2 + self.b**2 - self.c**2) / (2 * s)
-        height = mp.sqrt(self.b**2 - along**2)
-        pin = (along + self.sign * height * 1j) * across / s - across
+        pin = meeting_point(self.a * mp.expj(theta), 1, self.b, self.c, self.sign) - 1
         if self.c < 0:
             pin = -pin
         error = mp.arg(pin) - self.wanted(theta)
@@ -379,18 +376,16 @@ def test_angle_fit_improves_the_equation_fit(number, noise):
 def fit_by_hand(
     logarithms: np.ndarray, crank: tuple[float, ...], rocker: tuple[float, ...]
 ) -> float:
-    """Sum the squares of the smaller of both assemblies' errors, by the law of cosines."""
+    """Sum the squares of the smaller of both assemblies' errors."""
     a, b, c = np.exp(logarithms).tolist()
     sums = []
     for sign in (-1, 1):
         total = 0.0
         for theta, phi in zip(crank, rocker, strict=True):
-            diagonal = a * exp(1j * theta) - 1.0
-            s = abs(diagonal)
-            cosine = (s * s + c * c - b * b) / (2 * s * c)
-            if not -1 <= cosine <= 1:
+            pin = meeting_point(a * exp(1j * theta), 1.0, b, c, sign)
+            if pin is None:
                 return 1e3
-            total += remainder(phase(diagonal) + sign * acos(cosine) - phi, tau) ** 2
+            total += remainder(phase(pin - 1.0) - phi, tau) ** 2
         sums.append(total)
     return min(sums)
 

@@ -28,6 +28,8 @@ from linkage_ros.tools.drawing import OTHER, WANTED
 import numpy as np
 import pytest
 
+from ...support.four_bar import meeting_point
+
 colors = pytest.importorskip('matplotlib.colors')
 
 # sources/003: lengths and coefficients with 50 digits, rounded; see sources/README.md.
@@ -41,13 +43,11 @@ CRANK_ROCKER = FourBar((0j, 0.1 + 0j), 0.04 + 0j, (0j, 0.12 + 0j), 0.08 + 0j, 'l
 
 
 def closed_left(four_bar: FourBar, crank: float) -> tuple[complex, float, float]:
-    """Return where P is, and the directions of coupler and rocker, by the law of cosines."""
+    """Return where P is, and the directions of coupler and rocker."""
     a = four_bar.pivots[0] + four_bar.crank * rect(1.0, crank)
-    diagonal = four_bar.pivots[1] - a
-    b, c, s = abs(four_bar.coupler[1]), abs(four_bar.rocker), abs(diagonal)
-    coupler = phase(diagonal) + acos((b * b + s * s - c * c) / (2.0 * b * s))
-    pin = a + rect(b, coupler)
-    rocker = phase(pin - four_bar.pivots[1]) - phase(four_bar.rocker)
+    pivot = four_bar.pivots[1]
+    pin = meeting_point(a, pivot, abs(four_bar.coupler[1]), abs(four_bar.rocker))
+    coupler, rocker = phase(pin - a), phase(pin - pivot) - phase(four_bar.rocker)
     return a + (four_bar.traced or 0j) * rect(1.0, coupler), coupler, rocker
 
 

@@ -10,16 +10,18 @@
 Runs of scenes and exact motions that share nothing with the code that measures.
 
 A scene ticks as in the node, and its messages are read. The four-bar of the gallery has its
-angles by the law of cosines and its equation of motion by differences of its energy; it is
+angles in closed form and its equation of motion by differences of its energy; it is
 integrated by LSODA. A crank of constant inertia moves in parabolas, whose meetings are roots.
 """
 
-from cmath import phase, rect
-from math import acos, copysign, inf, sin, sqrt
+from cmath import rect
+from math import copysign, inf, sin, sqrt
 
 from linkage_ros.messages import JOINT_STATE_TYPE, JointStateWriter, MessageValues, POSITION, RATE
 from linkage_ros.tick import Pipeline
 from scipy.integrate import solve_ivp
+
+from ...support.four_bar import four_bar_angles, GALLERY
 
 BEGIN = 10**9
 
@@ -53,8 +55,7 @@ def command_messages(commands, *joints):
     return [(each.time, write(BEGIN, zeros, zeros, each.efforts)) for each in commands]
 
 
-A, B, C, D = 0.040, 0.120, 0.080, 0.100
-"""Lengths of the gallery's four-bar, in [m]: crank, coupler, rocker, ground."""
+A, B, C, D = GALLERY
 
 _MASSES = (  # Mass, centre, inertia of crank, coupler and rocker.
     (0.025, 0.020 + 0j, 4.2e-6),
@@ -63,24 +64,15 @@ _MASSES = (  # Mass, centre, inertia of crank, coupler and rocker.
 )
 
 
-def four_bar(theta):
-    """Return the directions of coupler and rocker, by the law of cosines."""
-    pin = rect(A, theta)
-    across = D - pin
-    s = abs(across)
-    coupler = phase(across) + acos((B * B + s * s - C * C) / (2.0 * B * s))
-    return coupler, phase(pin + rect(B, coupler) - D)
-
-
 def four_bar_joints(theta):
     """Return the published joints."""
-    coupler, rocker = four_bar(theta)
+    coupler, rocker = four_bar_angles(theta)
     return {'crank_joint': theta, 'coupler_joint': coupler - theta, 'rocker_joint': rocker}
 
 
 def four_bar_ratios(theta):
     """Return the rates of crank, coupler and rocker, as factors of the crank's."""
-    coupler, rocker = four_bar(theta)
+    coupler, rocker = four_bar_angles(theta)
     return (
         1.0,
         A * sin(rocker - theta) / (B * sin(coupler - rocker)),
@@ -97,9 +89,9 @@ class FourBar:
         )  # fmt: skip
 
     def inertia(self, theta):
-        coupler, _ = four_bar(theta)
+        coupler, _ = four_bar_angles(theta)
         ratios = four_bar_ratios(theta)
-        directions = (theta, coupler, four_bar(theta)[1])
+        directions = (theta, coupler, four_bar_angles(theta)[1])
         pin_rate = 1j * rect(A, theta)
         total = self.drive_inertia
         for index, (mass, center, inertia) in enumerate(_MASSES):
@@ -110,7 +102,7 @@ class FourBar:
         return total
 
     def potential(self, theta):
-        coupler, rocker = four_bar(theta)
+        coupler, rocker = four_bar_angles(theta)
         places = (
             _MASSES[0][1] * rect(1.0, theta),
             rect(A, theta) + _MASSES[1][1] * rect(1.0, coupler),

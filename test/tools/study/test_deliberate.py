@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from itertools import islice
-from math import cos, hypot, sqrt, tau
+from math import sqrt, tau
 
 from linkage_ros.description import parse_scene, Scene
 from linkage_ros.errors import FileError
@@ -26,10 +26,11 @@ from linkage_ros.tools.study import (
 import numpy as np
 import pytest
 
+from ...support.four_bar import four_bar_angles, GALLERY
+
 RATE, TICKS = 1000.0, 2000
 FILE = shipped_path('linkages/four_bar.yaml').read_bytes()
-# Lengths of that file, in [m].
-CRANK, COUPLER, ROCKER, GROUND = 0.04, 0.12, 0.08, 0.1
+CRANK, _, ROCKER, GROUND = GALLERY
 
 
 def scene_of(rest: str, drive: str = 'constant_rate: {rate: 6.283185307179586}') -> Scene:
@@ -38,11 +39,8 @@ def scene_of(rest: str, drive: str = 'constant_rate: {rate: 6.283185307179586}')
 
 
 def rocker_of(crank: float) -> float:
-    """Return the angle of the rocker by the law of cosines, B on the left of A→O4."""
-    x, y = CRANK * cos(crank), CRANK * np.sin(crank)
-    to_pin = hypot(GROUND - x, y)
-    inner = np.arccos((ROCKER**2 + to_pin**2 - COUPLER**2) / (2.0 * ROCKER * to_pin))
-    return float(np.arctan2(y, x - GROUND) - inner)
+    """Return the angle of the rocker, B on the left of A→O4."""
+    return four_bar_angles(crank)[1]
 
 
 def rockers(times: object) -> np.ndarray:

@@ -23,28 +23,13 @@ from linkage_ros.resources import linkage_names, shipped_path
 from linkage_ros.tools.view import build_model, Conversation, page_html as page_of, UserFile
 import pytest
 
+from .conftest import pixel_of, READY
 from .served import Served, served
 from ...browser.opened import opened
 
 NEAR = 1e-12
-READY = "() => typeof View !== 'undefined' && View.board"
 FOUR_BAR = shipped_path('linkages/four_bar.yaml').read_text('utf-8')
 QUIET = "() => typeof View !== 'undefined' && !View.state().busy && View.state().there"
-
-
-@pytest.fixture(scope='module')
-def stills(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return a function that writes the page of a shipped linkage, which needs no server."""
-    folder = tmp_path_factory.mktemp('stills')
-
-    def written(name: str) -> Path:
-        file = folder / f'{name}.html'
-        if not file.exists():
-            text = shipped_path(f'linkages/{name}.yaml').read_text('utf-8')
-            file.write_text(page_of(build_model(text, name), mode='still'), 'utf-8')
-        return file
-
-    return written
 
 
 @contextmanager
@@ -78,16 +63,6 @@ def state(page: Any) -> dict[str, Any]:
 
 def closure_of(text: str) -> Closure:
     return read_closure(parse_yaml(text.encode(), 'page'))
-
-
-def pixel_of(page: Any, pin: str) -> tuple[float, float]:
-    """Return where a pin is in the window."""
-    page.locator('#drawing').scroll_into_view_if_needed()
-    box = page.locator('#drawing').bounding_box()
-    x, y = page.evaluate(
-        'pin => View.board.toPixel(View.linkage.pins().find((p) => p.name === pin).place)', pin
-    )
-    return box['x'] + x, box['y'] + y
 
 
 def drag(page: Any, pin: str, across: float, down: float) -> None:

@@ -23,10 +23,10 @@ from linkage_ros.tools.view import build_model, Conversation, page_html as page_
 import numpy as np
 import pytest
 
+from .conftest import pixel_of, READY
 from .served import served
 from ...browser.opened import opened
 
-READY = "() => typeof View !== 'undefined' && View.board"
 ITERATED = ('hexapod',)
 """What a page asks its server for: too many cells for a program."""
 COMPILED = [name for name in spatial_linkage_names() if name not in ITERATED]
@@ -35,20 +35,6 @@ TOLD = 'View.linkage.drawn.shapes.length && [...Array(View.linkage.drawn.count).
 
 def text_of(name: str) -> str:
     return shipped_path(f'linkages/space/{name}.yaml').read_text('utf-8')
-
-
-@pytest.fixture(scope='module')
-def stills(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return a function that writes the page of a shipped linkage, which needs no server."""
-    folder = tmp_path_factory.mktemp('stills')
-
-    def written(name: str) -> Path:
-        file = folder / f'{name}.html'
-        if not file.exists():
-            file.write_text(page_of(build_model(text_of(name), name), mode='still'), 'utf-8')
-        return file
-
-    return written
 
 
 @contextmanager
@@ -66,16 +52,6 @@ def spots(page: Any) -> np.ndarray:
 
 def camera(page: Any) -> Camera:
     return Camera(*page.evaluate('View.linkage.camera'))
-
-
-def pixel_of(page: Any, pin: str) -> np.ndarray:
-    """Return where a point is in the window."""
-    page.locator('#drawing').scroll_into_view_if_needed()
-    box = page.locator('#drawing').bounding_box()
-    x, y = page.evaluate(
-        'pin => View.board.toPixel(View.linkage.pins().find((p) => p.name === pin).place)', pin
-    )
-    return np.array([box['x'] + x, box['y'] + y])
 
 
 def drag(page: Any, start: np.ndarray, end: np.ndarray) -> None:
@@ -113,9 +89,9 @@ def test_drag_moves_a_point_or_turns_the_camera(
     with shown(browser, stills('rssr')) as page:
         first = camera(page)
         # The ball on the crank, to where it is seen a third of a radian on.
-        here = pixel_of(page, 'A')
+        here = np.array(pixel_of(page, 'A'))
         page.evaluate('View.seek([0.33])')
-        there = pixel_of(page, 'A')
+        there = np.array(pixel_of(page, 'A'))
         page.evaluate('View.seek([0])')
         drag(page, here, there)
         (value,) = page.evaluate('View.state().inputs')

@@ -130,14 +130,14 @@ class PRPDyad(_CrossingLines):
         self, pose: PRPPose, solved: LinkState, velocities: LinkState
     ) -> tuple[float, float]:
         """Append the rates of both slides."""
-        one, other = pose.units
+        first, second = pose.units
         turn, other_turn = (velocities.coordinates[k] for k in self.arms)
         start, end = (velocities.pins[k] for k in self._starts)
         begin, finish = (solved.pins[k] for k in self._starts)
         frame = where(abs(turn) < abs(other_turn), turn, other_turn)
         carried = end - start - 1j * frame * (finish - begin)
-        carried += 1j * ((other_turn - frame) * pose.second) * other
-        carried -= 1j * ((turn - frame) * pose.first) * one
+        carried += 1j * ((other_turn - frame) * pose.second) * second
+        carried -= 1j * ((turn - frame) * pose.first) * first
         return resolve_along_lines(carried, pose.units, pose.across.imag, velocities)
 
     def accelerations(
@@ -150,11 +150,11 @@ class PRPDyad(_CrossingLines):
     ) -> None:
         """Append the accelerations of both slides."""
         v, a = velocities.coordinates, accelerations.coordinates
-        (i, j), (one, other) = self.arms, pose.units
+        (i, j), (first, second) = self.arms, pose.units
         slide_rate, other_slide_rate = rates
         start, end = (accelerations.pins[k] for k in self._starts)
-        carried = end + _carried_acceleration(pose.second, other_slide_rate, v[j], a[j]) * other
-        carried -= start + _carried_acceleration(pose.first, slide_rate, v[i], a[i]) * one
+        carried = end + _carried_acceleration(pose.second, other_slide_rate, v[j], a[j]) * second
+        carried -= start + _carried_acceleration(pose.first, slide_rate, v[i], a[i]) * first
         resolve_along_lines(carried, pose.units, pose.across.imag, accelerations)
 
 
@@ -167,8 +167,11 @@ def resolve_along_lines(
     between: complex, units: tuple[complex, complex], sine: float, state: LinkState
 ) -> tuple[float, float]:
     """Resolve a vector along both lines, and append its components."""
-    one, other = units
-    first, second = cross_product(between, other) / sine, cross_product(between, one) / sine
+    first_unit, second_unit = units
+    first, second = (
+        cross_product(between, second_unit) / sine,
+        cross_product(between, first_unit) / sine,
+    )
     state.coordinates.append(first)
     state.coordinates.append(second)
     return first, second
@@ -211,15 +214,15 @@ class CrankPRPDyad(_CrossingLines):
     def close(self, solved: LinkState) -> PRPPose:
         """Append r1 and r2."""
         x = solved.coordinates
-        (i, j), (one, other) = self.arms, self._offsets
+        (i, j), (h1, h2) = self.arms, self._offsets
         across = unit_vector(x[j] - x[i]) * self._across
         sine, cosine = across.imag, across.real
         if abs(sine) <= ROUNDING:
-            gap = abs(one * cosine - other)
+            gap = abs(h1 * cosine - h2)
             far = gap > ROUNDING * self._size
             status = Status.OPEN if far else Status.INDETERMINATE
             return PRPPose(status, gap if far else 0.0, 0.0, 0.0, across)
-        first, second = (one * cosine - other) / sine, (one - other * cosine) / sine
+        first, second = (h1 * cosine - h2) / sine, (h1 - h2 * cosine) / sine
         x.append(first)
         x.append(second)
         return PRPPose(Status.CLOSED, 0.0, first, second, across)

@@ -272,10 +272,10 @@ class FoldingRRRDyad(RRRDyad):
         whole = Fraction(a) + Fraction(d)
         apart = Fraction(d) - Fraction(a)
         left, right = (
-            float(whole * (apart - Fraction(one) + Fraction(other)))
-            if exact_sum(d, -a, -one, other)
+            float(whole * (apart - Fraction(first) + Fraction(second)))
+            if exact_sum(d, -a, -first, second)
             else 0.0
-            for one, other in ((b, c), (c, b))
+            for first, second in ((b, c), (c, b))
         )
         self._constants = (float(whole), b + c, b - c, diagonal.brackets[1], left, right)
 
@@ -298,8 +298,8 @@ class FoldingRRRDyad(RRRDyad):
         ratio = self._sign * fold_ratio * stretch_ratio
         side = copysign(1.0, ratio)
         # 1 on one side and 0 on the other.
-        same, other = 0.5 + 0.5 * side, 0.5 - 0.5 * side
-        constant = same * left + other * right
+        same, opposite = 0.5 + 0.5 * side, 0.5 - 0.5 * side
+        constant = same * left + opposite * right
         more, less, bent = 1.0 + abs(ratio), 0.0, 0.0
         if bracket:
             less = bracket / stretch / stretch / more
@@ -309,8 +309,8 @@ class FoldingRRRDyad(RRRDyad):
         i, j = self.diagonal.arms
         base = v[j]
         swing = v[i] - base
-        first = 0.5 * (same * less + other * more) - rest
-        second = 0.5 * (same * more + other * less) - rest
+        first = 0.5 * (same * less + opposite * more) - rest
+        second = 0.5 * (same * more + opposite * less) - rest
         v.append(base + swing * first)
         v.append(base + swing * second)
         return FoldingRRRRates(swing, first, second, side, constant)
@@ -444,32 +444,34 @@ class DrivenRRRDyad(TwoSided):
         """Append the angles of the first link of each group."""
         x = solved.coordinates
         start, end = (solved.pins[i] for i in self._ends)
-        one, other = (side.vector_at(x) for side in self._sides)
-        b, c = abs(one), abs(other)
+        first, second = (side.vector_at(x) for side in self._sides)
+        b, c = abs(first), abs(second)
         diagonal = free_diagonal(
             end - start, abs(start) + abs(end), abs(b - c), b + c, 4.0 * b * c
         )
         difference = (b - c) * (b + c)
         pose = close_triangle(diagonal, difference, difference, self._sign)
-        x.append(pose.first - phase(one))
-        x.append(pose.second - phase(other))
-        return DrivenRRRPose(pose.status, pose.gap, pose, (one, other))
+        x.append(pose.first - phase(first))
+        x.append(pose.second - phase(second))
+        return DrivenRRRPose(pose.status, pose.gap, pose, (first, second))
 
     def rates(
         self, pose: DrivenRRRPose, solved: LinkState, velocities: LinkState
     ) -> DrivenRRRRates:
         """Append the rates of the first link of each group."""
         start, end = self._ends
-        (one, _), (other, _) = (
+        (first, _), (second, _) = (
             side.vector_derivatives(solved.coordinates, velocities.coordinates)
             for side in self._sides
         )
         unit, other_unit = self._unit_vectors(pose)
-        between = velocities.pins[end] + other * other_unit - velocities.pins[start] - one * unit
+        between = (
+            velocities.pins[end] + second * other_unit - velocities.pins[start] - first * unit
+        )
         vector = solved.pins[end] - solved.pins[start]
         rate = free_diagonal_rate(pose.triangle.diagonal, vector, between)
         triangle_rates(pose.triangle, self._sign, rate, velocities)
-        return DrivenRRRRates(rate, (one, other))
+        return DrivenRRRRates(rate, (first, second))
 
     def accelerations(
         self,
@@ -495,8 +497,8 @@ class DrivenRRRDyad(TwoSided):
         ):
             _, change = side.vector_derivatives(x, v, a)
             pulls.append((change + 2j * turn * rate) * unit)
-        one, other = pulls
-        between = accelerations.pins[end] + other - accelerations.pins[start] - one
+        first, second = pulls
+        between = accelerations.pins[end] + second - accelerations.pins[start] - first
         growth_change = free_diagonal_acceleration(
             growth, solved.pins[end] - solved.pins[start], between
         )
@@ -516,10 +518,10 @@ class DrivenRRRDyad(TwoSided):
 
     def _unit_vectors(self, pose: DrivenRRRPose) -> tuple[complex, complex]:
         """Return e^{iθ} of the first link of each group."""
-        triangle, (one, other) = pose.triangle, pose.sides
+        triangle, (first, second) = pose.triangle, pose.sides
         return (
-            unit_vector(triangle.first - phase(one)),
-            unit_vector(triangle.second - phase(other)),
+            unit_vector(triangle.first - phase(first)),
+            unit_vector(triangle.second - phase(second)),
         )
 
 
@@ -543,27 +545,27 @@ class InvertedRRRDyad(TwoSided):
     P→A, and ψ of A→D on its own link, P→A has the direction ψ − δ₂, and B→D the direction
     ψ + δ₁ − δ₂. If the input turns the other way, all is mirrored.
 
-    ``base`` is the coordinate of the link that carries A and D, ``given`` that of the input.
+    ``base`` is the coordinate of the link that carries A and D, ``inner`` that of the input.
     ``mirror`` is −1 if the input is the angle of the first link against the second; ``flip`` is
     the sign of the triangle where this dyad has the sign +1.
     """
 
-    __slots__ = ('_base', '_dyad', '_flip', '_given', '_mirror')
+    __slots__ = ('_base', '_dyad', '_flip', '_inner', '_mirror')
 
-    def __init__(self, dyad: RRRDyad, base: int, given: int, mirror: float, flip: int) -> None:
+    def __init__(self, dyad: RRRDyad, base: int, inner: int, mirror: float, flip: int) -> None:
         self._dyad = dyad
-        self._base, self._given = base, given
+        self._base, self._inner = base, inner
         self._mirror, self._flip = mirror, flip
         super().__init__(dyad.sign * flip)
 
     def with_sign(self, sign: int) -> InvertedRRRDyad:
         """Return the same dyad in the assembly of a sign."""
         dyad: RRRDyad = self._dyad.with_sign(sign * self._flip)
-        return InvertedRRRDyad(dyad, self._base, self._given, self._mirror, self._flip)
+        return InvertedRRRDyad(dyad, self._base, self._inner, self._mirror, self._flip)
 
     def close(self, solved: LinkState) -> InvertedRRRPose:
         """Append the directions of P→A and of B→D."""
-        within = LinkState(solved.coordinates[: self._given + 1], [])
+        within = LinkState(solved.coordinates[: self._inner + 1], [])
         pose = self._dyad.close(within)
         if pose.status.has_pose:
             self._append(solved.coordinates, within.coordinates)
@@ -573,7 +575,7 @@ class InvertedRRRDyad(TwoSided):
         self, pose: InvertedRRRPose, _solved: LinkState, velocities: LinkState
     ) -> tuple[DiagonalRate, LinkState]:
         """Append the rates of both."""
-        within = LinkState(velocities.coordinates[: self._given + 1], [])
+        within = LinkState(velocities.coordinates[: self._inner + 1], [])
         rate = self._dyad.rates(pose.triangle, pose.within, within)
         self._append(velocities.coordinates, within.coordinates)
         return rate, within
@@ -588,7 +590,7 @@ class InvertedRRRDyad(TwoSided):
     ) -> None:
         """Append the accelerations of both."""
         rate, velocities = rates
-        within = LinkState(accelerations.coordinates[: self._given + 1], [])
+        within = LinkState(accelerations.coordinates[: self._inner + 1], [])
         self._dyad.accelerations(pose.triangle, rate, pose.within, velocities, within)
         self._append(accelerations.coordinates, within.coordinates)
 

@@ -126,9 +126,7 @@ def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
         fitted = design._replace(four_bar=_change_design(start, best.x))
         candidates.append((root_mean_square(fitted), fitted))
     # A result that overflowed counts as the worst.
-    return min(candidates, key=lambda candidate: candidate[0] if isfinite(candidate[0]) else inf)[
-        1
-    ]
+    return min(candidates, key=lambda row: row[0] if isfinite(row[0]) else inf)[1]
 
 
 def root_mean_square(design: Design) -> float:

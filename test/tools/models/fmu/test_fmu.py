@@ -34,6 +34,7 @@ from mpmath import mp, mpf
 import pytest
 
 from .importer import Bench
+from ....support.four_bar import meeting_point
 from ....support.messages import joint_state, read_joint_state
 from ....support.scenes import FIVE_BAR, four_bar_text, LINKAGES, scene_of
 
@@ -262,8 +263,8 @@ def test_fmu_accelerations_equal_those_of_the_pipeline(bench):
     assert any(shown)
 
 
-def test_fmu_in_fmpy_obeys_the_law_of_cosines(tmp_path):
-    # FMPy's own loop; the rocker by the triangle A-O4-B, at 30 digits.
+def test_fmu_in_fmpy_moves_as_the_closed_form(tmp_path):
+    # FMPy's own loop; the rocker by circles that meet, at 30 digits.
     file = tmp_path / 'four_bar.fmu'
     file.write_bytes(_fmu('bare'))
     result = simulate_fmu(str(file), stop_time=0.05, start_values={CRANK: 0.7, CRANK_RATE: 2.0})
@@ -274,9 +275,8 @@ def test_fmu_in_fmpy_obeys_the_law_of_cosines(tmp_path):
             # Each step sends the angle again, which its rate carries to the end of the step.
             seconds = mpf('0.001') if row['time'] else mpf(0)
             crank = a * mp.expj(mpf(0.7) + 2 * seconds)
-            to_crank = crank - d
-            between = mp.acos((abs(to_crank) ** 2 + c**2 - b**2) / (2 * abs(to_crank) * c))
-            assert abs(mp.arg(to_crank) - between - mpf(float(row[ROCKER]))) < 1e-12
+            rocker = mp.arg(meeting_point(crank, d, b, c) - d)
+            assert abs(rocker - mpf(float(row[ROCKER]))) < 1e-12
 
 
 def test_fmu_reset_repeats_and_another_seed_changes_the_noise(bench):

@@ -8,10 +8,9 @@
 
 """Bags written by hand for pages: every kind of event, names that are markup, and a long run."""
 
-from cmath import phase, rect
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 import json
-from math import acos, cos, nan, pi, sin
+from math import cos, nan, pi, sin
 from pathlib import Path
 
 from linkage_ros.bag import BagWriter, RUN_FILE
@@ -21,6 +20,7 @@ import numpy as np
 
 from .runs import diagnostics, Said
 from ....cli.recorded import BEGIN, FOUR_BAR, JOINT_STATE, MS, scene_file, SECOND, topic
+from ....support.four_bar import four_bar_angles
 
 STATES, CRANK, FAULTS = '/joint_states', '/crank_states', '/linkage/faults'
 WITHHELD, RESETS, HEALTH = '/linkage/withheld', '/linkage/resets', '/diagnostics'
@@ -52,11 +52,9 @@ Message = tuple[str, int, int, bytes]
 
 
 def follow(a: float, b: float, c: float, d: float, crank: float) -> tuple[float, float]:
-    """Return the published angles of a four-bar's coupler and rocker, by the law of cosines."""
-    pin = rect(a, crank)
-    s, way = abs(d - pin), phase(d - pin)
-    coupler = way + acos((b * b + s * s - c * c) / (2 * b * s))
-    return coupler - crank, phase(pin + rect(b, coupler) - d)
+    """Return the published angles of a four-bar's coupler and rocker."""
+    coupler, rocker = four_bar_angles(crank, (a, b, c, d))
+    return coupler - crank, rocker
 
 
 def close(crank: float) -> tuple[float, float, float]:
