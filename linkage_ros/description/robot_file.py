@@ -477,8 +477,9 @@ class _Robot:
         open_by, turned_by = (
             max(zip(map(length, errors), (loop.name for loop in loops), strict=True),
                 default=(0.0, ''))
-            for errors, loops in ((pose.gaps(frames), pose.closed),
-                                 (pose.turns(frames), pose.directed))
+            for errors, loops in (
+                (pose.gaps(frames), pose.closed), (pose.turns(frames), pose.directed),
+            )
         )  # fmt: skip
         for (apart, worst), unit, most in (
             (open_by, 'm', _MET * pose.size), (turned_by, 'rad', _MET),

@@ -177,8 +177,8 @@ class JointMatrix:
         def find_solution(*numbers: float) -> Sequence[float] | None:
             if any(hasattr(number, 'apply') for number in numbers):
                 return solve(*numbers)
-            found = line(*numbers)
-            return found[0] if found and all(map(isfinite, found[0])) else None
+            solution = line(*numbers)
+            return solution[0] if solution and all(map(isfinite, solution[0])) else None
 
         return find_solution
 

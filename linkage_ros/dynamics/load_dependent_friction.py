@@ -114,7 +114,7 @@ class FrictionSolver:
         forces: Sequence[Any],
         levers: Sequence[Any],
         motion: Sequence[Any],
-        found: Sequence[Any],
+        frictions: Sequence[Any],
     ) -> list[list[Any]]:
         """
         Return better frictions where the only input slides, to be tested by `find_sliding`.
@@ -122,10 +122,10 @@ class FrictionSolver:
         ``forces`` are as in `forces_in`, for F₀, F₁ and the P_k; ``levers`` are |ψ'| of each
         joint. ``motion`` is the pull and the mobility: q̈ without this friction, in [rad/s²] or
         [m/s²], and how much it falls with a unit of this friction at the input: sign(q̇)/I; 0 if
-        q̈ is given. ``found`` are the frictions of the step before.
+        q̈ is given. ``frictions`` are the frictions of the step before.
         """
         numbers, count = self._begin_forces(*forces, *levers, *motion), self._count
-        improved = self._improve_frictions(*found, *numbers[count:])
+        improved = self._improve_frictions(*frictions, *numbers[count:])
         if not improved:
             return []
         effort = _sum_products(levers, improved)
@@ -139,13 +139,13 @@ class FrictionSolver:
 
         ``improve`` returns the results of `improve_sliding` from the frictions of a step before.
         """
-        found: Sequence[float] = (0.0,) * self._count
+        frictions: Sequence[float] = (0.0,) * self._count
         for _ in range(_MOST_STEPS // self._steps):
-            improved = improve(found)
+            improved = improve(frictions)
             if not improved:
                 return None
-            found, missing, sizes, (effort,) = improved
-            if _stays(found, missing, sizes):
+            frictions, missing, sizes, (effort,) = improved
+            if _stays(frictions, missing, sizes):
                 return effort
         return None
 
@@ -221,9 +221,9 @@ class FrictionSolver:
             if improved is None:
                 return None
             (numbers,) = improved
-            found, missing = numbers[:count], numbers[count:]
-            if _stays(found, missing, sizes):
-                return found
+            frictions, missing = numbers[:count], numbers[count:]
+            if _stays(frictions, missing, sizes):
+                return frictions
         return None
 
     def _begin_forces(self, *numbers: Any) -> list[Any]:
@@ -276,9 +276,9 @@ class FrictionSolver:
         return missing, slopes
 
 
-def _stays(found: Sequence[float], missing: Sequence[float], sizes: Sequence[float]) -> bool:
+def _stays(frictions: Sequence[float], missing: Sequence[float], sizes: Sequence[float]) -> bool:
     """Return whether what is missing of frictions is rounding."""
-    for friction, left, size in zip(found, missing, sizes, strict=True):
+    for friction, left, size in zip(frictions, missing, sizes, strict=True):
         # Not a number: no force is that great.
         if not abs(left) <= size + _STAYS * abs(friction):
             return False
@@ -305,7 +305,8 @@ def _solve_dominant(matrix: Sequence[Sequence[Any]], right: Sequence[Any]) -> li
             ]
     solution: list[Any] = []
     for k, row in reversed([*enumerate(rows)]):
-        *entries, side = row[k + 1 :]
+        after = k + 1
+        *entries, side = row[after:]
         total = reduce(sub, map(mul, entries, solution), side)
         solution.insert(0, total / row[k])
     return solution

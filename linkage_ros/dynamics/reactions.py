@@ -507,8 +507,8 @@ class Reactions:
         """
         closure, places = self._mechanics.closure, self._follower.places(position)
         begin = len(numbers) - len(self._load_dependent)
-        given, found = numbers[: begin - 2], numbers[begin:]
-        columns, units = self._sides_by_accelerations(position, velocity, places, given)
+        (*load_values, pull, mobility), frictions = numbers[:begin], numbers[begin:]
+        columns, units = self._sides_by_accelerations(position, velocity, places, load_values)
         forces = self._frictions.forces_in(
             *self._matrix.varying_at(position, places), *columns, *units
         )
@@ -517,8 +517,7 @@ class Reactions:
         v = velocity.state.coordinates
         unit = self._scale if closure.linkage.inputs[0].slider else 1.0
         levers = [abs(rubbing.slip_rate(v) / (unit * v[1])) for rubbing in self._load_dependent]
-        motion = numbers[begin - 2 : begin]
-        return self._frictions.improve_sliding(forces, levers, motion, found)
+        return self._frictions.improve_sliding(forces, levers, (pull, mobility), frictions)
 
     def _sides_by_accelerations(
         self,

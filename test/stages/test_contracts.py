@@ -51,7 +51,7 @@ READ = [
         'tolerance',
         'four_bar',
         '{standard_deviation: 2.0e-5, links: [ground, coupler], given: {coupler.B: [0.0001, 0]}}',
-        ToleranceEffect(2e-5, ('ground', 'coupler'), {'coupler.B': (1e-4, 0.0)}),
+        ToleranceEffect(2e-5, links=('ground', 'coupler'), given={'coupler.B': (1e-4, 0.0)}),
     ),
     (
         'backlash',
