@@ -142,7 +142,10 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
             *(['leave --assemblies out'] if arguments.assemblies else []),
             *([f'write -o {arguments.output.with_suffix(".svg")}'] if is_dxf else []),
         ]
-        raise LinkageError(arguments.file, 'is a spatial linkage', ', and '.join(remedies))
+        reason = 'is a spatial linkage'
+        if is_dxf:
+            reason += ', whose links are no flat parts to be cut'
+        raise LinkageError(arguments.file, reason, ', and '.join(remedies))
     camera = camera_of(arguments, closure)
     if arguments.assemblies:
         if not chosen:
