@@ -22,7 +22,7 @@ from typing import Any
 
 from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError, where
 from linkage_ros.kinematics.built_once import BuiltProperty
-from linkage_ros.kinematics.iterated.elimination import add, multiply, subtract
+from linkage_ros.kinematics.iterated.elimination import add, Elimination, multiply, subtract
 from linkage_ros.kinematics.iterated.grid import Grid, GridInput, LineForms
 from linkage_ros.kinematics.iterated.group import (
     Equations,
@@ -268,23 +268,36 @@ class GridGroup(IteratedGroup):
         rates = LinkState([0.0] * len(at.coordinates), [])
         for k, rate in zip(self.inputs, direction, strict=True):
             rates.coordinates[k] = rate
-        slopes = self._list_rates(at, pose, rates)
-        bends = self._list_bends(at, pose, rates, slopes)
+        matrix = self._eliminate(at, pose)
+        slopes = self._list_rates(at, pose, rates, matrix)
+        bends = self._list_bends(at, pose, rates, slopes, matrix)
         return [*self._free_of(slopes), *(0.5 * bend for bend in bends)]
 
     def _free_of(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self._equations.free]
 
-    def _list_rates(self, at: LinkState, pose: LinkState, rates: LinkState) -> list[Any]:
+    def _eliminate(self, at: LinkState, pose: LinkState) -> Elimination:
+        known = require_state(self._before.known_at(at.coordinates))
+        return self._equations.eliminate(known, self._equations.complete(pose.coordinates, known))
+
+    def _list_rates(
+        self, at: LinkState, pose: LinkState, rates: LinkState, matrix: Elimination
+    ) -> list[Any]:
         """Return the rates of all unknowns at rates of the inputs."""
         states = self._before.states_at(at.coordinates, rates.coordinates)
         known, velocities = require_state(states)
         unknowns = self._equations.complete(pose.coordinates, known)
         still = [0.0] * len(unknowns)
-        return self._equations.solve_motion(GroupMotion(unknowns, known, still, velocities))
+        motion = GroupMotion(unknowns, known, still, velocities)
+        return self._equations.solve_motion(motion, matrix)
 
     def _list_bends(
-        self, at: LinkState, pose: LinkState, rates: LinkState, slopes: Sequence[Any]
+        self,
+        at: LinkState,
+        pose: LinkState,
+        rates: LinkState,
+        slopes: Sequence[Any],
+        matrix: Elimination,
     ) -> list[Any]:
         """Return the accelerations of the free unknowns at steady rates of the inputs."""
         steady = [0.0] * len(at.coordinates)
@@ -293,25 +306,26 @@ class GridGroup(IteratedGroup):
         unknowns = self._equations.complete(pose.coordinates, known)
         still = [0.0] * len(unknowns)
         motion = GroupMotion(unknowns, known, slopes, velocities, still, changes)
-        return self._free_of(self._equations.solve_motion(motion))
+        return self._free_of(self._equations.solve_motion(motion, matrix))
 
     def _list_forms(self, at: LinkState, pose: LinkState) -> list[Any]:
         """Return slopes and bends: rates and accelerations along one input, or along two."""
-        slopes: list[Any] = []
+        # One matrix for all inputs: their number squared is how often it would be eliminated.
+        matrix, slopes = self._eliminate(at, pose), list[Any]()
         squares: dict[tuple[int, int], list[Any]] = {}
         alone: dict[int, list[Any]] = {}
 
         def rates_along(*inputs: int) -> LinkState:
             return LinkState([float(k in inputs) for k in range(len(at.coordinates))], [])
 
-        for first in self.inputs:
-            alone[first] = self._list_rates(at, pose, rates_along(first))
-            slopes += self._free_of(alone[first])
-        for first, second in combinations_with_replacement(self.inputs, 2):
-            along, slope = rates_along(first, second), alone[first]
-            if first != second:
-                slope = [a + b for a, b in zip(slope, alone[second], strict=True)]
-            squares[first, second] = self._list_bends(at, pose, along, slope)
+        for one in self.inputs:
+            alone[one] = self._list_rates(at, pose, rates_along(one), matrix)
+            slopes += self._free_of(alone[one])
+        for one, other in combinations_with_replacement(self.inputs, 2):
+            along, found = rates_along(one, other), alone[one]
+            if one != other:
+                found = [a + b for a, b in zip(found, alone[other], strict=True)]
+            squares[one, other] = self._list_bends(at, pose, along, found, matrix)
         bends = []
         for (first, second), both in squares.items():
             if first == second:

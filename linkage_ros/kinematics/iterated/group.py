@@ -112,11 +112,13 @@ class Equations:
         """Return by how much a part has no length; None if all have some."""
         return None
 
-    def solve_motion(self, motion: GroupMotion) -> list[Any]:
+    def eliminate(self, known: LinkState, unknowns: Sequence[Any]) -> Elimination:
+        """Return the matrix of all motions of a state."""
+        return Elimination(self.evaluate(known, unknowns)[1], self.unit_pivots)
+
+    def solve_motion(self, motion: GroupMotion, matrix: Elimination) -> list[Any]:
         """Return the highest derivatives of the unknowns, of a motion that has 0 for them."""
         drift = self.drift(motion)
-        # On a tape the matrix is that of rates and of accelerations, and is there only once.
-        matrix = Elimination(self.evaluate(motion.solved, motion.unknowns)[1], self.unit_pivots)
         return matrix.solve([0.0 if is_zero(row) else -row for row in drift])
 
     # The closing equations by the free unknowns

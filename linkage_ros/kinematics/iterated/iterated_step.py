@@ -206,7 +206,7 @@ class IteratedStep(Step):
         self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
     ) -> tuple[list[Any], LinkState]:
         motion = GroupMotion(unknowns, known, [0.0] * len(unknowns), velocities)
-        rates = self._equations.solve_motion(motion)
+        rates = self._equations.solve_motion(motion, self._equations.eliminate(known, unknowns))
         return rates, self._equations.move(motion._replace(rates=rates))
 
     def _list_accelerations(
@@ -219,7 +219,8 @@ class IteratedStep(Step):
     ) -> LinkState:
         still = [0.0] * len(unknowns)
         motion = GroupMotion(unknowns, known, rates, velocities, still, changes)
-        accelerations = self._equations.solve_motion(motion)
+        matrix = self._equations.eliminate(known, unknowns)
+        accelerations = self._equations.solve_motion(motion, matrix)
         return self._equations.move(motion._replace(accelerations=accelerations))
 
     def _trace_examples(self) -> dict[str, Any]:

@@ -160,10 +160,11 @@ class KnotPlanner:
                     heappush(waiting, (len(union), next(number), union))
         # None of the small sets: all joints together, and then without each that can be left out.
         joints = frozenset(names)
-        for name in names if closing_rods(joints) else ():
-            less = frozenset().union(*(moved for moved in supports if moved <= joints - {name}))
-            joints = less if closing_rods(less) else joints
         closing = closing_rods(joints)
+        for name in names if closing else ():
+            less = frozenset().union(*(moved for moved in supports if moved <= joints - {name}))
+            if fewer := closing_rods(less):
+                joints, closing = less, fewer
         return self._make_plan(joints, closing) if closing else None
 
     def _make_plan(self, joints: frozenset[str], rods: list[PlannedRod]) -> KnotPlan:
