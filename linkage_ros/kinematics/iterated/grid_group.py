@@ -318,14 +318,14 @@ class GridGroup(IteratedGroup):
         def rates_along(*inputs: int) -> LinkState:
             return LinkState([float(k in inputs) for k in range(len(at.coordinates))], [])
 
-        for one in self.inputs:
-            alone[one] = self._list_rates(at, pose, rates_along(one), matrix)
-            slopes += self._free_of(alone[one])
-        for one, other in combinations_with_replacement(self.inputs, 2):
-            along, found = rates_along(one, other), alone[one]
-            if one != other:
-                found = [a + b for a, b in zip(found, alone[other], strict=True)]
-            squares[one, other] = self._list_bends(at, pose, along, found, matrix)
+        for first in self.inputs:
+            alone[first] = self._list_rates(at, pose, rates_along(first), matrix)
+            slopes += self._free_of(alone[first])
+        for first, second in combinations_with_replacement(self.inputs, 2):
+            along, slope = rates_along(first, second), alone[first]
+            if first != second:
+                slope = [a + b for a, b in zip(slope, alone[second], strict=True)]
+            squares[first, second] = self._list_bends(at, pose, along, slope, matrix)
         bends = []
         for (first, second), both in squares.items():
             if first == second:
