@@ -539,7 +539,7 @@ def _branches_table(sweep: InputSweep, units: DisplayUnits) -> Table:
         Column('limits of', 'limited_by', form=limits_text),
         Column(None, 'held'),
     )
-    turning = {one.joint: one.unit == 'rad' for one in sweep.closure.linkage.inputs}
+    turning = {held.joint: held.unit == 'rad' for held in sweep.closure.linkage.inputs}
     at = [
         f'{name} at {units.value_text(x, turning[name])}' for name, x in sweep.held_inputs.items()
     ]

@@ -66,13 +66,13 @@ def check_ratios(
     ``followers`` are the joints that may follow others, ``what`` says which these are, and
     ``leaders`` are those that may be followed.
     """
-    driven = {driven.joint for driven in linkage.inputs}
+    inputs = {driven.joint for driven in linkage.inputs}
     for name, ratio in linkage.ratios.items():
         key = f'ratios.{name}'
-        if name in driven:
+        if name in inputs:
             reason = f'{quote(name)} is an input, which follows no joint'
             raise DefinitionError(key, reason, 'leave one of the two out')
-        check_name(key, name, what, {*followers} - driven)
+        check_name(key, name, what, {*followers} - inputs)
         for of in ratio.terms:
             end = 'of' if of == ratio.of else 'also'
             check_name(f'{key}.{end}', of, 'joint', leaders)

@@ -75,16 +75,16 @@ class Bounds:
 
     def __init__(self, linkage: Any) -> None:
         limits = {name: of for name, of in linkage.limits.items() if of.is_bounded}
-        driven = [driven.joint for driven in linkage.inputs]
+        inputs = [driven.joint for driven in linkage.inputs]
         self.inputs = tuple(
             _make_bound(name, index, limits[name])
-            for index, name in enumerate(driven)
+            for index, name in enumerate(inputs)
             if name in limits
         )
         self.joints = tuple(
             _make_bound(name, index, limits[name], turning=isinstance(joint, RevoluteJoint))
             for index, (name, joint) in enumerate(linkage.joints.items())
-            if name in limits and name not in driven
+            if name in limits and name not in inputs
         )
 
     def __bool__(self) -> bool:

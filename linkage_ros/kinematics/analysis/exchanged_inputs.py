@@ -279,12 +279,10 @@ class PlaneExchange:
     ) -> None:
         self._closure, self._names, self._rebuild = closure, names, rebuild
         linkage = closure.linkage
-        driven = {driven.joint: driven for driven in linkage.inputs}
-        joints = {
-            name: _as_joint(driven_joint, near[name]) for name, driven_joint in driven.items()
-        }
-        joints |= {name: joint for name, joint in linkage.joints.items() if name not in driven}
-        inputs = [driven.get(name) or Input.from_joint(name, joints[name]) for name in names]
+        before = {driven.joint: driven for driven in linkage.inputs}
+        joints = {name: _as_joint(driven, near[name]) for name, driven in before.items()}
+        joints |= {name: joint for name, joint in linkage.joints.items() if name not in before}
+        inputs = [before.get(name) or Input.from_joint(name, joints[name]) for name in names]
         # The inputs as joints, and the other joints.
         self._linkage = replace(
             linkage,

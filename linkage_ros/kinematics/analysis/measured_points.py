@@ -40,12 +40,12 @@ def with_measured(linkage: Linkage, names: Sequence[str]) -> Linkage:
 
     A name that is neither a joint nor describes what moves raises DefinitionError.
     """
-    driven = {driven.joint: driven for driven in linkage.inputs}
+    inputs = {driven.joint: driven for driven in linkage.inputs}
     for name in names:
         if name in linkage.joints:
             continue
-        if name in driven:
-            joints = {**linkage.joints, name: driven[name].as_joint()}
+        if name in inputs:
+            joints = {**linkage.joints, name: inputs[name].as_joint()}
             linkage = replace(linkage, joints=joints)
         else:
             linkage = _add_measured(linkage, name)

@@ -74,19 +74,19 @@ def golden_section(
 ) -> tuple[float, float]:
     """Return the minimum and minimiser of a function on an interval, by golden section."""
     first, second = high - _RATIO * (high - low), low + _RATIO * (high - low)
-    at_one, at_other = function(first), function(second)
+    at_first, at_second = function(first), function(second)
     for _ in range(80):
         if not low < first < second < high:
             break
-        if at_one <= at_other:
-            high, second, at_other = second, first, at_one
+        if at_first <= at_second:
+            high, second, at_second = second, first, at_first
             first = high - _RATIO * (high - low)
-            at_one = function(first)
+            at_first = function(first)
         else:
-            low, first, at_one = first, second, at_other
+            low, first, at_first = first, second, at_second
             second = low + _RATIO * (high - low)
-            at_other = function(second)
-    return min((at_one, first), (at_other, second))
+            at_second = function(second)
+    return min((at_first, first), (at_second, second))
 
 
 def closing_ranges(closure: Closure) -> tuple[InputRange, ...]:

@@ -266,9 +266,9 @@ def round_corners(corners: Sequence[complex], radius: float) -> tuple[complex, .
 
 def _pitch_circles(pose: _DrawnPose) -> Iterator[tuple[str, Shape]]:
     """Yield the pitch circles of gears, and belts on pulleys: ratios of pins on a common link."""
-    driven = {driven.joint: driven for driven in pose.closure.linkage.driven_joints}
+    inputs = {driven.joint: driven for driven in pose.closure.linkage.driven_joints}
     for name, ratio in pose.closure.linkage.ratios.items():
-        joints = [driven[name], driven.get(ratio.of) or pose.closure.linkage.joints[ratio.of]]
+        joints = [inputs[name], inputs.get(ratio.of) or pose.closure.linkage.joints[ratio.of]]
         ends = [(getattr(j, 'parent', ''), getattr(j, 'child', '')) for j in joints]
         carrier = next((link for link in ends[0] if link and link in ends[1]), '')
         if not carrier:

@@ -690,5 +690,5 @@ def _limits_text(closure: Closure, bound: Bound) -> str:
 
 
 def _joint_unit(linkage: Linkage, bound: Bound) -> str:
-    driven = {driven.joint: driven.unit for driven in linkage.inputs}
-    return driven.get(bound.name) or linkage.joints[bound.name].unit
+    units = {driven.joint: driven.unit for driven in linkage.inputs}
+    return units.get(bound.name) or linkage.joints[bound.name].unit

@@ -359,9 +359,12 @@ class Grid:
         limits, cells = [*self._limits_to_fill()], dict[Key, tuple[float, ...]]()
         tried: dict[Key, bool] = {}
 
+        def are_too_many() -> bool:
+            return len(cells) > most or len(tried) > _TRIED * most
+
         def make(key: Key) -> bool:
             """Make a cell, or the narrower ones in it; return whether any is proven."""
-            if key in tried or len(cells) > most or len(tried) > _TRIED * most:
+            if key in tried or are_too_many():
                 return tried.get(key, False)
             with BUILD_LOCK:
                 numbers = self._follow(key).numbers
@@ -381,7 +384,7 @@ class Grid:
                 around = product(*(range(k - 1, k + 2) for k in places))
                 inside = (to for to in around if all(map(contains, ranges, to)))
                 waiting |= {to for to in inside if (0, *to) not in tried}
-        return None if len(cells) > most or len(tried) > _TRIED * most else cells
+        return None if are_too_many() else cells
 
     def _halve(self, key: Key, limits: Sequence[tuple[float, float]]) -> Iterator[Key]:
         """Yield the cells of half the width that lie in a cell and within limits."""

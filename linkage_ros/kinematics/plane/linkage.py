@@ -322,8 +322,8 @@ class JointedLinkage:
     def limits(self) -> dict[str, Limits]:
         """Return the limits of the joints that have any, by name, inputs first."""
         # An input that is also published has its limits as an input.
-        driven = {driven.joint: driven.limits for driven in self.inputs}
-        named = {name: joint.limits for name, joint in self.named_joints.items()} | driven
+        of_inputs = {driven.joint: driven.limits for driven in self.inputs}
+        named = {name: joint.limits for name, joint in self.named_joints.items()} | of_inputs
         return {name: limits for name, limits in named.items() if limits != NO_LIMITS}
 
 

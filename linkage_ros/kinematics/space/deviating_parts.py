@@ -120,8 +120,8 @@ class _DeviatingParts:
         }
         # For points on the axis of a hinge, on both of its links: the hinge.
         self._on_axes: dict[tuple[str, str], str] = {}
+        pairs = {frozenset((h.parent, h.child)): name for name, h in linkage.hinges.items()}
         for point, *ends in linkage.shared_points(on_axes=True):
-            pairs = {frozenset((h.parent, h.child)): name for name, h in linkage.hinges.items()}
             self._on_axes |= {(link, point): pairs[frozenset(ends)] for link in ends}
         self._deviations = deviations
         self._links = linkage.link_names[1:]

@@ -17,7 +17,6 @@ and faults. In space they come from the inputs, as in the report.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import repeat
 from math import dist, isfinite, nan
 from typing import Any, NamedTuple
 
@@ -149,7 +148,6 @@ def _live_model(
     """Return what a page shows of a scene in addition to the model of its first linkage."""
     shown = scene.linkages[0]
     inputs = closure.linkage.inputs
-    of_plane = _ground_cranks(closure) if isinstance(closure, PlanarClosure) else None
     return {
         'joints': [
             [name, 'rad' if turning else 'm']
@@ -159,7 +157,7 @@ def _live_model(
             )
         ],
         'inputs': list(shown.input_names),
-        'cranks': list(of_plane or repeat(None, len(inputs))),
+        'cranks': list(_ground_cranks(closure)),
         'turned': topic_driven is shown,
         'drive': (topic_driven or shown).drive[0],
         'efforts': [
@@ -170,11 +168,11 @@ def _live_model(
     }
 
 
-def _ground_cranks(closure: PlanarClosure) -> Iterator[list[float] | None]:
-    """Yield pin and length of each crank on the ground: there the mouse turns it."""
-    links = closure.linkage.links
+def _ground_cranks(closure: Closure) -> Iterator[list[float] | None]:
+    """Yield pin and length of each crank on the ground of a plane: there the mouse turns it."""
+    links = closure.linkage.links if isinstance(closure, PlanarClosure) else {}
     for driven in closure.linkage.inputs:
-        points, ground = links.get(driven.child, {}), links[GROUND]
+        points, ground = links.get(driven.child, {}), links.get(GROUND, {})
         pivots = [name for name in points if name in ground]
         if driven.unit != 'rad' or driven.parent != GROUND or not pivots:
             yield None
